@@ -7,7 +7,7 @@ from apo_bench.assembly.goals import Observation as Observation
 from apo_bench.assembly.goals import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
-from apo_bench.benchmark.sweeps.grid import SweepSettings as SweepSettings
+from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
@@ -20,7 +20,7 @@ from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
 from apo_bench.perception.detection.contacts import recognise as recognise
 from apo_bench.perception.observation.observing import observe as observe
-from apo_bench.records.settings import TrialSettings as TrialSettings
+from apo_bench.records.settings import TrialConfig as TrialConfig
 from apo_bench.records.thresholds import Criteria as Criteria
 from apo_bench.scenario.file import load_scenario as load_scenario
 from apo_bench.scenario.layout import draw_layout as draw_layout

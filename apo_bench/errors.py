@@ -31,7 +31,7 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     hint = f"; did you mean '{near[0]}'?" if near else "."
     shown = names if len(names) <= _MOST else get_close_matches(given, names, n=_MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
-    return f"unknown {kind} '{one_line(given, _LONGEST)}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+    return f"unknown {kind} '{one_line(given, _LONGEST)}'{hint} Known: {', '.join(shown) or 'uncorrected'}{more}."
 
 
 def one_line(text: str, longest: int) -> str:

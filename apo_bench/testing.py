@@ -14,9 +14,9 @@ from typing import Any, final
 
 from apo_bench.assembly import Correction, Observation
 from apo_bench.benchmark.scoring.track import read_track
-from apo_bench.benchmark.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.benchmark.sweeps.grid import SweepConfig, load_all, units
 from apo_bench.errors import require, unknown
-from apo_bench.records import CORRECTOR, TrialSettings
+from apo_bench.records import CORRECTOR, TrialConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
@@ -80,7 +80,7 @@ def sequential_test(
 
 def assert_success_rate(
     method: str | Callable[[Observation], Correction],
-    trials: str | Path | TrialSettings | Mapping[str, Any],
+    trials: str | Path | TrialConfig | Mapping[str, Any],
     *,
     at_least: float,
     margin: float,
@@ -111,26 +111,26 @@ def assert_success_rate(
     return decision
 
 
-def _cells(trials: Any, method: str) -> list[TrialSettings]:
+def _cells(trials: Any, method: str) -> list[TrialConfig]:
     """One trial of every cell."""
     if isinstance(trials, Mapping):
-        allowed = [each.name for each in fields(TrialSettings) if each.name not in ("method", "seed")]
+        allowed = [each.name for each in fields(TrialConfig) if each.name not in ("method", "seed")]
         for key in trials:
             require(key in allowed, unknown("setting", str(key), allowed))
         require("scenario" in trials, "the settings of a cell have no scenario; name one.")
-        trials = TrialSettings(**trials)
-    if isinstance(trials, TrialSettings):
+        trials = TrialConfig(**trials)
+    if isinstance(trials, TrialConfig):
         return [replace(trials, method=method)]
     require(
         isinstance(trials, str | Path),
-        f"{trials!r} was given as trials; give a track, by name or file, or TrialSettings.",
+        f"{trials!r} was given as trials; give a track, by name or file, or TrialConfig.",
     )
     track = read_track(trials)
-    grids: list[SweepSettings] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
+    grids: list[SweepConfig] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
     return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit]
 
 
-def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str]) -> Iterator[bool]:
+def _outcomes(cells: list[TrialConfig], seed: int, method: Any, said: list[str]) -> Iterator[bool]:
     """Success of each trial that counts, cells in turn, every trial with a seed of its own."""
     scenes: dict[Any, tuple[Scene, str]] = {}
     for i in count():

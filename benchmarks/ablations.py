@@ -2,8 +2,8 @@
 
 Methods of a sweep from the folder of a clone:
 
-    apo-bench sweep stick_in_tower carried_bridge vanished_fixture pocket_table --levels 2 --careless 1 --trials 20 \\
-        --methods paper,benchmarks.ablations:last_only,benchmarks.ablations:minimal,benchmarks.ablations:no_history,\
+    apo-bench sweep stick_in_tower carried_bridge vanished_fixture pocket_table --noise-level 2 --human-error-scale 1 --trials 20 \\
+        --method paper,benchmarks.ablations:last_only,benchmarks.ablations:minimal,benchmarks.ablations:no_history,\
 benchmarks.ablations:no_disappeared --out runs/ablations
 """
 

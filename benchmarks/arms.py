@@ -16,7 +16,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import wilson
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_rows
 from benchmarks.made_with import mujoco_of, with_mujoco
 
@@ -26,7 +26,7 @@ SAID = """\
 
 Written by `python benchmarks/arms.py` from sweeps of `benchmarks/arms.toml`, one for each arm that comes with the
 benchmark. Success: the finished assembly is right; clearance of 0.25 mm per side, held by friction, simulated near
-contacts only (`--fidelity contact`). `oracle` is told the true goals; `contact` corrects poses that were seen with
+contacts only (`--fidelity near-contact`). `oracle` is told the true goals; `contact` corrects poses that were seen with
 noise of 0, 1 and 2 mm and degrees, half of the trials shown by careless humans. The seeds are the same for every arm.
 The last lines have 95 % intervals (Wilson).
 What [`arm check`](../guide/arm.md#what-was-measured) says of each arm stands in the guide.
@@ -57,33 +57,33 @@ def main() -> None:
     print(f"Wrote {PAGE}")
 
 
-def page(rows: Sequence[Row]) -> str:
+def page(rows: Sequence[TrialRecord]) -> str:
     """Trials whose demonstration failed are not among the rows."""
     arms = list(dict.fromkeys(str(row["arm"]) for row in rows))
     return "\n".join([SAID, *_table(arms, rows), "", *_failures(arms, rows), ""])
 
 
-def _table(arms: Sequence[str], rows: Sequence[Row]) -> list[str]:
+def _table(arms: Sequence[str], rows: Sequence[TrialRecord]) -> list[str]:
     places = sorted({(row["scenario"], *_way(row)) for row in rows})
     lines = [
         f"| scenario | method | level | {' | '.join(f'`{arm}`' for arm in arms)} |",
         f"|---|---|---|{'---|' * len(arms)}",
     ]
-    for scenario, method, level in places:
-        found = _counts(arms, [row for row in rows if (row["scenario"], *_way(row)) == (scenario, method, level)])
-        lines.append(_line(f"{scenario} | `{method}` | {level}", [found[arm].text() for arm in arms]))
-    for method, level in sorted({_way(row) for row in rows}):
-        found = _counts(arms, [row for row in rows if _way(row) == (method, level)])
-        lines.append(_line(f"**all** | `{method}` | {level}", [found[arm].rate() for arm in arms]))
+    for scenario, method, noise_level in places:
+        found = _counts(arms, [row for row in rows if (row["scenario"], *_way(row)) == (scenario, method, noise_level)])
+        lines.append(_line(f"{scenario} | `{method}` | {noise_level}", [found[arm].text() for arm in arms]))
+    for method, noise_level in sorted({_way(row) for row in rows}):
+        found = _counts(arms, [row for row in rows if _way(row) == (method, noise_level)])
+        lines.append(_line(f"**all** | `{method}` | {noise_level}", [found[arm].rate() for arm in arms]))
     return lines
 
 
-def _way(row: Row) -> tuple[str, str]:
+def _way(row: TrialRecord) -> tuple[str, str]:
     """Method and level; the oracle meets none."""
-    return row["method"], "any" if row["method"] == "oracle" else f"{row['level']:g}"
+    return row["method"], "any" if row["method"] == "oracle" else f"{row['noise_mm']:g}"
 
 
-def _counts(arms: Sequence[str], rows: Sequence[Row]) -> Mapping[str, Count]:
+def _counts(arms: Sequence[str], rows: Sequence[TrialRecord]) -> Mapping[str, Count]:
     of = {arm: [row["success"] for row in rows if row["arm"] == arm] for arm in arms}
     return {arm: Count(sum(map(bool, found)), len(found)) for arm, found in of.items()}
 
@@ -92,7 +92,7 @@ def _line(first: str, rest: Sequence[str]) -> str:
     return f"| {first} | {' | '.join(rest)} |"
 
 
-def _failures(arms: Sequence[str], rows: Sequence[Row]) -> list[str]:
+def _failures(arms: Sequence[str], rows: Sequence[TrialRecord]) -> list[str]:
     how = Counter(
         (str(row["arm"]), row["scenario"], row["failure_stage"], row["failure_code"])
         for row in rows

@@ -38,13 +38,13 @@ ROBUST = Kept(
     ROOT / "docs" / "results" / "robust.md",
     ROOT / "benchmarks" / "results" / "robust.csv",
     (ROOT / "benchmarks" / "robust.toml",),
-    ("noise", "level", "clearance_mm", "careless", "scenario", "method", "looks"),
+    ("noise", "noise_level", "clearance_mm", "human_error_scale", "scenario", "method", "max_reobservations"),
 )
 ROUND = Kept(
     ROOT / "docs" / "results" / "round.md",
     ROOT / "benchmarks" / "results" / "round.csv",
     (ROOT / "benchmarks" / "round.toml", ROOT / "benchmarks" / "gearbox.toml"),
-    ("scenario", "clearance_mm", "careless", "level", "relations", "method"),
+    ("scenario", "clearance_mm", "human_error_scale", "noise_level", "contact_source", "method"),
 )
 
 
@@ -91,7 +91,7 @@ def _trials(path: Path) -> Iterator[Any]:
 
 
 def _key(trial: Any, place: tuple[str, ...]) -> tuple[Any, ...]:
-    own = {"level": trial.level_mm}
+    own = {"noise_level": trial.noise_mm}
     return tuple(_value(own[name] if name in own else getattr(trial, name)) for name in place)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_rows
 
 KEPT = Path(__file__).parent / "results" / "baselines.csv"
@@ -24,7 +24,7 @@ class Place(NamedTuple):
 
     scenario: str
     method: str
-    level: float
+    noise_level: float
     """Of `oracle`, which meets none, 0."""
 
 
@@ -51,12 +51,12 @@ def main() -> None:
     print(f"Wrote {KEPT}")
 
 
-def counted(rows: Iterable[Row]) -> dict[Place, Count]:
+def counted(rows: Iterable[TrialRecord]) -> dict[Place, Count]:
     """Trials whose demonstration was right, and successes among them."""
     ends: dict[Place, list[bool]] = defaultdict(list)
     for row in rows:
         if row["success"] is not None:
-            ends[Place(row["scenario"], row["method"], float(row["level"] or 0.0))].append(row["success"])
+            ends[Place(row["scenario"], row["method"], float(row["noise_mm"] or 0.0))].append(row["success"])
     return {place: Count(len(each), sum(each)) for place, each in ends.items()}
 
 
@@ -64,7 +64,7 @@ def kept() -> Mapping[Place, Count]:
     """The counts that are committed."""
     with KEPT.open(encoding="utf-8", newline="") as file:
         return {
-            Place(line["scenario"], line["method"], float(line["level"])): Count(
+            Place(line["scenario"], line["method"], float(line["noise_level"])): Count(
                 int(line["trials"]), int(line["successes"])
             )
             for line in csv.DictReader(file)

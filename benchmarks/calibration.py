@@ -32,7 +32,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.fitted import MeasuredNoise, restated
-from apo_bench.perception.observation.noise import FAILURES, NOISES, Level, make_noise
+from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets, read_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
@@ -95,7 +95,7 @@ def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = N
         layout = draw_layout(scenario, rng, 0.0)
         n = len(layout.goals)
         shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
-        seen = make_noise(name, Level(1.0, 1.0))(scenario.assembly, shown, rng)
+        seen = make_noise(name, NoiseLevel(1.0, 1.0))(scenario.assembly, shown, rng)
         truth = np.array(layout.goals)
         if seen.seen.all() and not any(outliers(name, seen, truth)):
             made += 1

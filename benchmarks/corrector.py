@@ -27,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from benchmarks.corrector_bench import suite_door, suite_quality
 from benchmarks.corrector_bench.page import page
 from benchmarks.corrector_bench.part import part
-from benchmarks.corrector_bench.rows import Row, printed, records, save
+from benchmarks.corrector_bench.rows import TrialRecord, printed, records, save
 
 OUT = Path(__file__).resolve().parent / "results" / "corrector.json"
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "corrector.md"
@@ -48,7 +48,7 @@ PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam", "pyceres")
 def main() -> int:
     given = _arguments()
     commit = _commit()
-    rows = list[Row]()
+    rows = list[TrialRecord]()
     suites = _kept(given.out)
     for suite in given.only:
         start = time.monotonic()
@@ -82,7 +82,7 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _measured(suite: str, draws: int) -> list[Row]:
+def _measured(suite: str, draws: int) -> list[TrialRecord]:
     if suite == "quality":
         return suite_quality.suite(draws)
     if suite == "door":

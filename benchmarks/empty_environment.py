@@ -61,11 +61,20 @@ for each in metadata.distributions():
 print(json.dumps(found))
 """
 TIME = "import time; began = time.process_time(); import apo_bench; print(time.process_time() - began)"
-TRIAL = ("replay", "stick_in_tower", "--seed", "7", "--fidelity", "contact", "--json")
+TRIAL = ("replay", "stick_in_tower", "--seed", "7", "--fidelity", "near-contact", "--json")
 CORRECT = ("correct", "stick_in_tower", "--observation", "seen.csv", "--method", "contact")
 SWEEP = (
-    *("sweep", "block_on_block", "--levels", "0,1", "--careless", "0", "--methods", "none,paper,contact"),
-    *("--trials", "2", "--workers", "1", "--fidelity", "contact", "--out", "run"),
+    *(
+        "sweep",
+        "block_on_block",
+        "--noise-level",
+        "0,1",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected,paper,contact",
+    ),
+    *("--trials", "2", "--workers", "1", "--fidelity", "near-contact", "--out", "run"),
 )
 
 

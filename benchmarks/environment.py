@@ -2,7 +2,7 @@
 
 Every scenario as the environment is made by default (1 mm and 1 degree, the scenario's carelessness), seeds 0, 1, ..:
 random actions in the environment; zeros (as seen), a corrector before zeros, and `oracle`, which no environment has,
-as the same trials by `run_trial` at fidelity contact. Writes results/environment.csv and the table in
+as the same trials by `run_trial` at fidelity near-contact. Writes results/environment.csv and the table in
 docs/guide/environment.md.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 import gymnasium
 
 import apo_bench
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import scenario_names
 from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
@@ -26,7 +26,7 @@ KEPT = ROOT / "benchmarks" / "results" / "environment.csv"
 PAGE = ROOT / "docs" / "guide" / "environment.md"
 BEGIN = "<!-- table: python benchmarks/environment.py -->"
 END = "<!-- end of table -->"
-POLICIES = ("random", "none", "snap", "contact-robust", "oracle")
+POLICIES = ("random", "uncorrected", "snap", "contact-robust", "oracle")
 SEEDS = range(10)
 LEFT_OUT = ("gearbox",)
 """Ten operations: a random action alone takes minutes."""
@@ -83,13 +83,22 @@ def methods(scenario: str, seeds: Iterable[int]) -> dict[str, int]:
     scene = apo_bench.build_scene(apo_bench.load_scenario(scenario))
     right = dict.fromkeys(POLICIES[1:], 0)
     for seed in seeds:
-        shown = {careless: simulate_demonstration(scene, careless, seed) for careless in (0.0, 1.0)}
+        shown = {
+            human_error_scale: simulate_demonstration(scene, human_error_scale, seed)
+            for human_error_scale in (0.0, 1.0)
+        }
         for method in right:
-            level, careless = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
-            trial = TrialSettings(
-                scenario, method=method, seed=seed, level_mm=level, level_deg=level, careless=careless, fidelity=FAST
+            noise_level, human_error_scale = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
+            trial = TrialConfig(
+                scenario,
+                method=method,
+                seed=seed,
+                noise_mm=noise_level,
+                noise_deg=noise_level,
+                human_error_scale=human_error_scale,
+                fidelity=FAST,
             )
-            right[method] += bool(run_trial(trial, scene, simulated=shown[careless])["success"])
+            right[method] += bool(run_trial(trial, scene, simulated=shown[human_error_scale])["success"])
     return right
 
 

@@ -32,7 +32,7 @@ from apo_bench.judging.contacts import face_overlap
 from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models import Camera
 from apo_bench.perception.observation.models.failures import PRESETS, RATE, CameraFailures, Failure, draw_failing
-from apo_bench.perception.observation.noise import Level
+from apo_bench.perception.observation.noise import NoiseLevel
 from apo_bench.perception.observation.observing import observe
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
@@ -67,7 +67,7 @@ KINDS: dict[str, tuple[Failure, float]] = {
     "nearby": (Failure(see_nearby, "parts are seen 5 to 15 mm off", "S = T shifted"), 0.0),
     "unnamed": (Failure(see_elsewhere, "parts are seen elsewhere", "S anywhere"), 0.0),
 }
-LEVEL = Level(1.0, 1.0)
+NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 CLEARANCE_MM = 0.25
 """The play, which is the largest error in fixed directions of a plan that is right, too."""
 
@@ -92,7 +92,7 @@ def told(seen: Observation, false: NDArray[np.bool_]) -> Observation:
 STATED: dict[float, tuple[float, float]] = {1.0: (RATE, RATE), 1 / 3: (RATE, RATE / 3), 3.0: (RATE / 3, RATE)}
 """How many times the rate of failures is stated: the rate, and what is stated."""
 CORRECTORS = ("told", "contact-robust", "looks 2")
-LOOKS = 2
+REOBSERVE = 2
 
 
 @final
@@ -114,7 +114,7 @@ def drawn(draw: Draw) -> tuple[Demonstration, CameraFailures, Observation, NDArr
     scenario = load_scenario(draw.scene)
     failure, repeat = KINDS[draw.kind]
     rate, stated = STATED[draw.stated]
-    noise = CameraFailures(LEVEL, (failure._replace(rate=rate),), repeat)
+    noise = CameraFailures(NOISE_LEVEL, (failure._replace(rate=rate),), repeat)
     layout = draw_layout(scenario, np.random.default_rng([draw.seed, 30, 0]), 0.0)
     n = len(layout.goals)
     shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
@@ -129,14 +129,14 @@ def corrected(draw: Draw) -> dict[str, object]:
     scenario = load_scenario(draw.scene)
     shown, noise, seen, false = drawn(draw)
     first = np.random.default_rng([draw.seed, 30, 1])
-    looks = Looks(shown, noise, np.random.default_rng([draw.seed, 30, 2]), LOOKS, first=first)
+    max_reobservations = Looks(shown, noise, np.random.default_rng([draw.seed, 30, 2]), REOBSERVE, first=first)
     ends = dict[str, bool]()
     seconds = dict[str, float]()
     sentence = ""
     for name in CORRECTORS:
         since = time.process_time()
         given = told(seen, false) if name == "told" else seen
-        made = correct(given, "contact-robust", looks if name.startswith("looks") else None)
+        made = correct(given, "contact-robust", max_reobservations if name.startswith("max_reobservations") else None)
         seconds[name] = round(time.process_time() - since, 4)
         ends[name] = made.ok and right(scenario, shown, made.goals)
         sentence = made.sentence if name == "contact-robust" else sentence

@@ -30,7 +30,7 @@ import mujoco
 
 from apo_bench.benchmark.analysis import wilson
 from apo_bench.errors import InputError
-from apo_bench.records import TrialSettings, parsed
+from apo_bench.records import TrialConfig, parse_method
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.probing.feeling import ACTS
 from apo_bench.simulation.scene.scene import Scene
@@ -46,10 +46,10 @@ from apo_bench.trial.stages import (
     stream_key,
     trial_outcome,
 )
-from apo_bench.trial.trial import feels_of, noise_of
+from apo_bench.trial.trial import noise_of, probing_config
 
 SWEEP = Path(__file__).with_name("robot_errors.toml")
-METHODS = ("contact+feel", "oracle+feel")
+METHODS = ("contact+probe", "oracle+probe")
 ALL = "all"
 HALF_STEP = "half-step"
 VARIANTS = (ALL, *ACTS, HALF_STEP)
@@ -72,16 +72,16 @@ def main() -> None:
     asked.add_argument("--out", type=Path, required=True, metavar="FILE", help="lines of JSON, one a trial")
     asked.add_argument("--workers", type=int, default=1)
     asked.add_argument("--scenarios", nargs="+", default=sweep()["scenarios"])
-    asked.add_argument("--methods", nargs="+", default=METHODS, help="each with +feel")
+    asked.add_argument("--method", nargs="+", default=METHODS, help="each with +probe")
     asked.add_argument("--variants", nargs="+", default=VARIANTS, choices=VARIANTS, help="an act: it is left out")
     asked.add_argument("--table", action="store_true", help="run nothing, print the table of FILE")
     given = asked.parse_args()
     if given.table:
         print(table(lines_of(given.out)))
         return
-    if plain := [method for method in given.methods if not parsed(method).feels]:
-        asked.error(f"--methods {plain[0]} was given, which does not feel; write {parsed(plain[0]).plan}+feel.")
-    todo = missing(given.trials, given.scenarios, given.methods, given.variants, lines_of(given.out))
+    if plain := [method for method in given.method if not parse_method(method).probe]:
+        asked.error(f"--method {plain[0]} was given, which does not feel; write {parse_method(plain[0]).plan}+probe.")
+    todo = missing(given.trials, given.scenarios, given.method, given.variants, lines_of(given.out))
     try:
         for case in todo:
             settings_of(case)
@@ -107,7 +107,7 @@ def sweep() -> dict[str, Any]:
 
 def together() -> str:
     """All errors of the robot at once."""
-    return max(sweep()["robot_errors"], key=lambda name: name.count("+"))
+    return max(sweep()["robot_error"], key=lambda name: name.count("+"))
 
 
 def lines_of(path: Path) -> list[Line]:
@@ -134,16 +134,16 @@ def case_of(line: Line) -> Case:
     return Case(*(line[field] for field in Case._fields))
 
 
-def settings_of(case: Case) -> TrialSettings:
+def settings_of(case: Case) -> TrialConfig:
     """A trial of the sweep, but for the acts: level 1, a careful human."""
-    usual = TrialSettings(
+    usual = TrialConfig(
         case.scenario,
         clearance_mm=load_scenario(case.scenario).clearance_mm,
-        careless=0.0,
+        human_error_scale=0.0,
         method=case.method,
         seed=case.seed,
         robot_error=together(),
-        fidelity="contact",
+        fidelity="near-contact",
     )
     return replace(usual, timestep_s=usual.timestep_s / 2) if case.variant == HALF_STEP else usual
 
@@ -165,34 +165,34 @@ def trial(case: Case) -> Line:
         return first | {"success": None, "code": simulated.demonstration.code}
     truth = simulated.layout.goals
     seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), case.seed)
-    planned = apply_method(parsed(case.method).plan, seen, truth, where=scene)
+    planned = apply_method(parse_method(case.method).plan, seen, truth, where=scene)
     if planned.plan is None:
         assert planned.failure is not None
         return first | {"success": False, "code": planned.failure.code, "sentence": planned.failure.sentence}
     error = draw_robot_error(settings.robot_error, scene, case.seed)
     key = stream_key(case.seed, WRENCH)
-    feels = feels_of(planned.plan, scene, settings.robot_error, key, settings.wrench, acts_of(case.variant))
-    attempt = replay_and_judge(planned.plan, scene, truth, fidelity=settings.fidelity, error=error, feels=feels)
+    probing = probing_config(planned.plan, scene, settings.robot_error, key, settings.ft_sensor, acts_of(case.variant))
+    attempt = replay_and_judge(planned.plan, scene, truth, fidelity=settings.fidelity, error=error, probing=probing)
     outcome = trial_outcome(attempt)
     felt = attempt.result.felt
     return first | {
         "success": attempt.verdict.success,
         "code": outcome.code,
         "sentence": outcome.sentence,
-        "sim_seconds": attempt.result.sim_seconds,
-        "touches": None if felt is None else felt.touches,
+        "sim_time_s": attempt.result.sim_time_s,
+        "probe_contacts": None if felt is None else felt.touches,
     }
 
 
 @lru_cache(maxsize=8)
-def _demonstrated(settings: TrialSettings) -> tuple[Scene, SimulatedDemonstration]:
+def _demonstrated(settings: TrialConfig) -> tuple[Scene, SimulatedDemonstration]:
     scene = _scene(settings.scenario, settings.clearance_mm, settings.timestep_s)
-    return scene, simulate_demonstration(scene, settings.careless, settings.seed)
+    return scene, simulate_demonstration(scene, settings.human_error_scale, settings.seed)
 
 
 @cache
 def _scene(scenario: str, clearance_mm: float, timestep_s: float) -> Scene:
-    return scene_of(TrialSettings(scenario, clearance_mm=clearance_mm, timestep_s=timestep_s))
+    return scene_of(TrialConfig(scenario, clearance_mm=clearance_mm, timestep_s=timestep_s))
 
 
 def table(lines: Sequence[Line]) -> str:

@@ -39,7 +39,7 @@ from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.importers.cad.assembled import coming_near, mates_of
 from apo_bench.importers.cad.places import named_places, write_places
 from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.trial.stages import scene_of
@@ -189,7 +189,7 @@ def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[di
     # What has no way or no grasp is not run; a part that may not stand is, so that it is known whether that is true.
     if any(finding.what in ("file", "gripper") and not finding.ok for finding in found):
         return
-    asked = [TrialSettings(str(path), method=method, seed=seed) for seed in range(seeds) for method in METHODS]
+    asked = [TrialConfig(str(path), method=method, seed=seed) for seed in range(seeds) for method in METHODS]
     scene = scene_of(asked[0]) if asked else None
     for settings in asked:
         row = run_trial(settings, scene)

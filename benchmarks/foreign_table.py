@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-METHODS = ("oracle", "contact", "snap", "none")
+METHODS = ("oracle", "contact", "snap", "uncorrected")
 _GRASP = re.compile(r"gripper|grasp|fingers|held")
 _TURNING = re.compile(r"turning over")
 _DRAFTS = {

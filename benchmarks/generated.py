@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.importers.assembly.draft import draft
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.parts.making import (
     Body,
     Frustum,
@@ -244,7 +244,7 @@ def scenario_of(seed: int, folder: Path) -> Path:
 
 def rate(path: Path, method: str, seeds: int, fidelity: str) -> tuple[int, int]:
     """How many trials at 1 mm and 1 degree are right, of how many that count."""
-    asked = [TrialSettings(str(path), method=method, seed=seed, fidelity=fidelity) for seed in range(seeds)]
+    asked = [TrialConfig(str(path), method=method, seed=seed, fidelity=fidelity) for seed in range(seeds)]
     scene = scene_of(asked[0]) if asked else None
     rows = [run_trial(each, scene) for each in asked]
     counted = [row["success"] for row in rows if row["success"] is not None]

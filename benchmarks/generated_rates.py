@@ -24,7 +24,7 @@ from apo_bench.assembly import placements
 from apo_bench.benchmark.analysis import wilson
 from apo_bench.importers.assembly.checking import check_file
 from apo_bench.importers.assembly.posed import TABLE
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
@@ -44,7 +44,7 @@ COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation"
 CHECK = "check"
 """In place of a method: all but the trials of `scenario check`."""
 FEW = 5
-METHODS = ("oracle", "contact", "none", "snap", "snap+search", "by-heart")
+METHODS = ("oracle", "contact", "uncorrected", "snap", "snap+spiral", "nominal")
 """Seeds of all methods; of `contact` there are more."""
 HEADS = {"oracle": "`oracle`"} | {method: f"`{method}` at 1 mm" for method in METHODS[1:]}
 
@@ -83,11 +83,11 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
         for name, path in paths.items():
             methods = METHODS if seed < FEW else ("contact",)
             missing = [method for method in methods if (name, method, str(seed)) not in there]
-            asked = [TrialSettings(str(path), method=method, seed=seed) for method in missing]
+            asked = [TrialConfig(str(path), method=method, seed=seed) for method in missing]
             if not asked:
                 continue
             scenes[name] = scenes.get(name) or scene_of(asked[0])
-            simulated = simulate_demonstration(scenes[name], asked[0].careless, seed)
+            simulated = simulate_demonstration(scenes[name], asked[0].human_error_scale, seed)
             cache = ReplayCache()
             for settings in asked:
                 row = run_trial(settings, scenes[name], simulated=simulated, cache=cache)

@@ -47,7 +47,7 @@ LEFT_OUT = ("reached", "thresholds")
 EARLIER = "*The two sections below are of an earlier run than the tables above.*"
 LASTING = "## How long it takes"
 
-Row = Mapping[str, Any]
+TrialRecord = Mapping[str, Any]
 
 
 def main() -> None:
@@ -109,7 +109,7 @@ def write(agreement: Sequence[str]) -> None:
     print(f"Wrote {PAGE}, {FIGURE}, and the first look in {' and '.join(map(str, BLOCKS))}")
 
 
-def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
+def what_was_run(folder: Path, rows: Sequence[TrialRecord]) -> dict[str, Any]:
     """Versions, grids, code and times; the command is the one that does it again."""
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     times = read_timing(folder)
@@ -121,8 +121,8 @@ def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
         "command": f"make headline TRIALS={trials} FIDELITY={run['grids'][0]['fidelity']}",
         **{key: run[key] for key in ("schema", "grids", "versions", "python", "platform", "content", "code")},
         "rows": len(rows),
-        "replays": sum(row["sim_seconds"] is not None for row in rows),
-        "simulated_hours": round(sum(row["sim_seconds"] or 0.0 for row in rows) / 3600, 1),
+        "replays": sum(row["sim_time_s"] is not None for row in rows),
+        "simulated_hours": round(sum(row["sim_time_s"] or 0.0 for row in rows) / 3600, 1),
         "worker_hours": round(sum(map(worked_s, times)) / 3600, 2),
         "workers": len({t["worker"] for t in times}),
         "median_trial_s": {f"{s}, {m}": round(middle.median(x), 3) for (s, m), x in sorted(spent.items())},

@@ -16,10 +16,16 @@ from apo_bench.benchmark.analysis import Rate
 from apo_bench.benchmark.report.figures.style import INK, RULE, SOFT
 from benchmarks.headline_look import NOISES, TOLD_LEVEL, WORDS, Look, pooled, robot_rate, robot_scenarios
 
-LOOKS = {"none": "#d55e00", "search": "#c2186f", "contact-robust": "#332288", "contact": "#332288", "oracle": SOFT}
-LOOKS |= {"contact-robust+search": "#00745a"}
-LINES = ("none", "search", "snap", "by-heart")
-DASHES: Any = {"snap": (0, (4, 2)), "by-heart": (0, (1, 1.2))}
+REOBSERVE = {
+    "uncorrected": "#d55e00",
+    "spiral-search": "#c2186f",
+    "contact-robust": "#332288",
+    "contact": "#332288",
+    "oracle": SOFT,
+}
+REOBSERVE |= {"contact-robust+spiral": "#00745a"}
+LINES = ("uncorrected", "spiral-search", "snap", "nominal")
+DASHES: Any = {"snap": (0, (4, 2)), "nominal": (0, (1, 1.2))}
 FONT = 12.5
 NAME_HEIGHT = 5.5
 """Of a name beside a line, in percent of the axis."""
@@ -45,26 +51,32 @@ def draw_look(look: Look, path: Path) -> None:
 def draw_levels(axis: Any, look: Look) -> None:
     """Lines over the level; what falls has its name at the left, where the lines are apart."""
     levels = sorted(
-        {c.level for c in look.cells if c.careless == 0.0 and c.level > 0 and c.method in (*LINES, look.corrected)}
+        {
+            c.noise_level
+            for c in look.cells
+            if c.human_error_scale == 0.0 and c.noise_level > 0 and c.method in (*LINES, look.corrected)
+        }
     )
     names: list[tuple[float, str]] = []
     for method in dict.fromkeys((*LINES, look.corrected)):
-        points = [(k, pooled(look.cells, method, level)) for k, level in enumerate(levels)]
+        points = [(k, pooled(look.cells, method, noise_level)) for k, noise_level in enumerate(levels)]
         drawn = [(k, rate) for k, rate in points if rate is not None]
         if not drawn:
             continue
-        loud = method in LOOKS
+        loud = method in REOBSERVE
         dashes = "-" if loud else DASHES[method]
-        draw_line(axis, drawn, LOOKS.get(method, SOFT), 2.8 if loud else 1.6, dashes, band=loud)
+        draw_line(axis, drawn, REOBSERVE.get(method, SOFT), 2.8 if loud else 1.6, dashes, band=loud)
         if method == look.corrected:
-            axis.text(len(levels) / 2, 95, WORDS[method], color=LOOKS[method], fontweight="bold", va="top", ha="center")
+            axis.text(
+                len(levels) / 2, 95, WORDS[method], color=REOBSERVE[method], fontweight="bold", va="top", ha="center"
+            )
         else:
             names.append((percents(drawn)[0], method))
     for height, (_, method) in zip(apart([y for y, _ in sorted(names)]), sorted(names), strict=True):
         axis.text(
-            -0.2, height, WORDS[method], color=LOOKS.get(method, SOFT), fontweight="bold", va="center", ha="right"
+            -0.2, height, WORDS[method], color=REOBSERVE.get(method, SOFT), fontweight="bold", va="center", ha="right"
         )
-    axis.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
+    axis.set_xticks(range(len(levels)), [f"{noise_level:g}" for noise_level in levels])
     axis.set_xlim(-2.1, len(levels) - 0.8)
     axis.set_xlabel("error of the poses seen [mm and degrees]")
     axis.set_title("As seen, searched, corrected", loc="left", fontweight="bold", fontsize=FONT + 2)
@@ -87,18 +99,18 @@ def draw_outliers(axis: Any, look: Look) -> None:
     for noise, title in NOISES.items():
         axis.text(0, y, title, va="center", fontweight="bold", fontsize=FONT - 1.5)
         y -= 1
-        for method in dict.fromkeys(("none", "paper", "contact", look.corrected)):
+        for method in dict.fromkeys(("uncorrected", "paper", "contact", look.corrected)):
             rate = pooled(look.cells, method, TOLD_LEVEL, noise=noise)
             if rate is None:
                 continue
             value = 100 * rate.successes / rate.trials
             low, high = (100 * x for x in rate.interval)
-            color = LOOKS[method] if method == look.corrected else "#9aa3b2"
+            color = REOBSERVE[method] if method == look.corrected else "#9aa3b2"
             axis.barh(y, value, height=0.72, color=color)
             axis.plot([low, high], [y, y], color=INK, linewidth=1.2)
             axis.text(max(high, value) + 2, y, f"{value:.0f} %", va="center", fontsize=FONT - 1)
             ticks.append(y)
-            names.append("as seen" if method == "none" else method)
+            names.append("as seen" if method == "uncorrected" else method)
             y -= 1
         y -= 0.4
     axis.set_yticks(ticks, names, fontsize=FONT - 1)
@@ -115,12 +127,12 @@ def draw_robot(axis: Any, look: Look) -> None:
     kinds = {cell.robot_error for cell in look.cells if cell.robot_error.startswith("hand_eye:")}
     errors = ["none", *sorted(kinds, key=size_mm)]
     places = {"oracle": (0.03, 0.08, "left"), look.corrected: (0.03, 0.22, "left")}
-    for method, (x, y, side) in {**places, f"{look.corrected}+search": (0.99, 0.93, "right")}.items():
+    for method, (x, y, side) in {**places, f"{look.corrected}+spiral": (0.99, 0.93, "right")}.items():
         points = [(k, robot_rate(look, method, error)) for k, error in enumerate(errors)]
         drawn = [(k, rate) for k, rate in points if rate is not None]
         if not drawn:
             continue
-        color = LOOKS.get(method, SOFT)
+        color = REOBSERVE.get(method, SOFT)
         draw_line(axis, drawn, color, 2.6, (0, (1.2, 1.2)) if method == "oracle" else "-")
         axis.text(x, y, WORDS.get(method, method), color=color, fontweight="bold", ha=side, transform=axis.transAxes)
     axis.set_xticks(range(len(errors)), ["0", *(f"{size_mm(error):g}" for error in errors[1:])])

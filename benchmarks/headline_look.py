@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from apo_bench.benchmark.analysis import Cell, Rate
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 
 TOLD_LEVEL = 1.0
 """Of the sentence, and of where it breaks: mm and degrees."""
@@ -23,14 +23,14 @@ NOISES = {
 }
 WORDS = {
     "oracle": "the truth, replayed",
-    "none": "as seen",
-    "search": "searched",
+    "uncorrected": "as seen",
+    "spiral-search": "searched",
     "snap": "snapped",
-    "by-heart": "by heart",
+    "nominal": "by heart",
     "paper": "paper",
     "contact": "corrected",
     "contact-robust": "corrected",
-    "contact-robust+search": "corrected and searched",
+    "contact-robust+spiral": "corrected and searched",
 }
 
 
@@ -50,9 +50,9 @@ def look_at(cells: Sequence[Cell]) -> Look:
 def pooled(
     cells: Iterable[Cell],
     method: str,
-    level: float,
-    noise: str = TrialSettings.noise,
-    robot_error: str = TrialSettings.robot_error,
+    noise_level: float,
+    noise: str = TrialConfig.noise,
+    robot_error: str = TrialConfig.robot_error,
     scenarios: Iterable[str] | None = None,
 ) -> Rate | None:
     """Success of a method over scenarios, careful humans; None where it did not run."""
@@ -60,7 +60,7 @@ def pooled(
     here = [
         cell
         for cell in cells
-        if (cell.method, cell.level, cell.careless) == (method, level, 0.0)
+        if (cell.method, cell.noise_level, cell.human_error_scale) == (method, noise_level, 0.0)
         and (cell.noise, cell.robot_error) == (noise, robot_error)
         and (wanted is None or cell.scenario in wanted)
     ]
@@ -70,12 +70,12 @@ def pooled(
 
 def robot_rate(look: Look, method: str, error: str) -> Rate | None:
     """Success in the scenarios that were run with errors of the robot; the oracle meets no noise."""
-    level = 0.0 if method == "oracle" else TOLD_LEVEL
-    return pooled(look.cells, method, level, robot_error=error, scenarios=robot_scenarios(look.cells))
+    noise_level = 0.0 if method == "oracle" else TOLD_LEVEL
+    return pooled(look.cells, method, noise_level, robot_error=error, scenarios=robot_scenarios(look.cells))
 
 
 def robot_scenarios(cells: Iterable[Cell]) -> list[str]:
-    return sorted({cell.scenario for cell in cells if cell.robot_error != TrialSettings.robot_error})
+    return sorted({cell.scenario for cell in cells if cell.robot_error != TrialConfig.robot_error})
 
 
 def percent(rate: Rate | None) -> str | None:
@@ -85,7 +85,7 @@ def percent(rate: Rate | None) -> str | None:
 def sentence(look: Look) -> str:
     """What came out and where it breaks; what was not run is not said."""
     seen, searched, corrected = (
-        percent(pooled(look.cells, method, TOLD_LEVEL)) for method in ("none", "search", look.corrected)
+        percent(pooled(look.cells, method, TOLD_LEVEL)) for method in ("uncorrected", "spiral-search", look.corrected)
     )
     told = (
         f"When poses are seen {TOLD_LEVEL:g} mm and {TOLD_LEVEL:g} degree wrong, a robot finishes **{seen}** of the "
@@ -99,7 +99,7 @@ def sentence(look: Look) -> str:
             "with a pose estimator that misses a quarter of the parts and is far off in a quarter of the others "
             f"(**{measured}**)"
         )
-    robot, both = (percent(robot_rate(look, f"{look.corrected}{more}", ERROR)) for more in ("", "+search"))
+    robot, both = (percent(robot_rate(look, f"{look.corrected}{more}", ERROR)) for more in ("", "+spiral"))
     if robot:
         also = f", with a search as well **{both}**" if both else ""
         breaks.append(f"with a robot that is half a millimetre off itself (**{robot}**{also})")
@@ -108,11 +108,15 @@ def sentence(look: Look) -> str:
 
 def caption(look: Look) -> str:
     """What the figure shows, and of how many seeds."""
-    plain = [cell for cell in look.cells if (cell.method, cell.level, cell.careless) == ("none", TOLD_LEVEL, 0.0)]
-    plain = [cell for cell in plain if cell.noise == TrialSettings.noise]
+    plain = [
+        cell
+        for cell in look.cells
+        if (cell.method, cell.noise_level, cell.human_error_scale) == ("uncorrected", TOLD_LEVEL, 0.0)
+    ]
+    plain = [cell for cell in plain if cell.noise == TrialConfig.noise]
     seeds = max(cell.trials + cell.excluded for cell in plain)
     methods = {cell.method for cell in look.cells}
-    names = ("none", "search", "snap", "by-heart", look.corrected, "oracle")
+    names = ("uncorrected", "spiral-search", "snap", "nominal", look.corrected, "oracle")
     named = "; ".join(f"{WORDS[method]}: `{method}`" for method in names if method in methods)
     return (
         f"*Success in {len(plain)} tasks of the paper, {seeds} seeds each, with 95 % intervals. Errors are standard "

@@ -9,15 +9,15 @@ from typing import Any
 from apo_bench.benchmark.analysis import Cell, Paired
 from apo_bench.benchmark.sweeps.grid import described, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.records import SETTINGS, TrialSettings
+from apo_bench.records import SETTINGS, TrialConfig
 from benchmarks.headline_look import TOLD_LEVEL, Look, block, robot_scenarios
 from benchmarks.headline_tables import differing, rates, together, widths
 
 GRID = Path(__file__).with_name("headline.toml")
-METHODS = ("none", "search", "snap", "by-heart", "paper", "contact", "contact-robust")
+METHODS = ("uncorrected", "spiral-search", "snap", "nominal", "paper", "contact", "contact-robust")
 COMPARED = ("contact", "contact-robust")
 """With `paper`, seed by seed."""
-ROBOT_METHODS = {"oracle": 0.0, "contact-robust": TOLD_LEVEL, "contact-robust+search": TOLD_LEVEL}
+ROBOT_METHODS = {"oracle": 0.0, "contact-robust": TOLD_LEVEL, "contact-robust+spiral": TOLD_LEVEL}
 """Those that were run with errors of the robot, and their level."""
 BY_CONSTRUCTION = (
     "`none` is 0 here by construction: castle 2 (in pocket_table cube 2) is shown 1.5 to 4 mm off, and the play of the "
@@ -40,9 +40,9 @@ OLDER = " **`benchmarks/headline.toml` asks for other trials by now; these rows 
 def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement: Sequence[str]) -> list[str]:
     """The first look, all rates, and what was run."""
     least = min(cell.trials for cell in look.cells)
-    plain = [c for c in look.cells if c.noise == TrialSettings.noise and c.robot_error == TrialSettings.robot_error]
+    plain = [c for c in look.cells if c.noise == TrialConfig.noise and c.robot_error == TrialConfig.robot_error]
     held = sorted((c for c in plain if c.method in METHODS), key=in_order)
-    broken = sorted((c for c in look.cells if c.noise != TrialSettings.noise), key=in_order)
+    broken = sorted((c for c in look.cells if c.noise != TrialConfig.noise), key=in_order)
     robot = sorted((c for c in look.cells if of_robot(c, robot_scenarios(look.cells))), key=by_error)
     other = [c for c in plain if c.method not in (*METHODS, *ROBOT_METHODS)]
     oracle = [c for c in plain if c.method == "oracle"]
@@ -63,14 +63,14 @@ def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement:
         "",
         "They put parts where they belong.",
         "",
-        *rates([c for c in held if c.careless == 0.0], ("scenario", "method"), named, lambda c: c.level),
+        *rates([c for c in held if c.human_error_scale == 0.0], ("scenario", "method"), named, lambda c: c.noise_level),
         "",
         "### Careless humans",
         "",
         f"They put parts wrong and adjust them later, as in the paper. {BY_CONSTRUCTION} What stands wrong to each "
         "other before anything is inserted cannot be searched away.",
         "",
-        *rates([c for c in held if c.careless == 1.0], ("scenario", "method"), named, lambda c: c.level),
+        *rates([c for c in held if c.human_error_scale == 1.0], ("scenario", "method"), named, lambda c: c.noise_level),
         "",
         *section("## Where it breaks: outliers", OUTLIERS, ("noise", "method"), broken),
         *section("## Where it breaks: the robot's own error", ROBOT, ("robot error", "method"), robot),
@@ -113,7 +113,10 @@ def up_to_date(ran: Mapping[str, Any]) -> bool:
     first = ran["grids"][0]
     grids = read_sweep(GRID, {"trials": first["trials"], "fidelity": first["fidelity"]})
     # in sweeps that are older than these settings nothing abstained or felt
-    usual = {SETTINGS[name].axis: [SETTINGS[name].default] for name in ("wrench", "stated_error", "abstain")}
+    usual = {
+        SETTINGS[name].axis: [SETTINGS[name].default]
+        for name in ("ft_sensor", "assumed_robot_error", "min_predicted_success")
+    }
     kept = [{**usual, **grid} for grid in ran["grids"]]
     return described(grids, load_all(grids)) == kept
 
@@ -129,18 +132,24 @@ def section(title: str, said: str, heads: tuple[str, str], cells: Sequence[Cell]
 
 def in_order(cell: Cell) -> tuple[Any, ...]:
     """Humans, scenarios or noises, methods from what was seen to what is corrected, levels."""
-    return cell.careless, cell.noise, cell.scenario, (*METHODS, cell.method).index(cell.method), cell.level
+    return (
+        cell.human_error_scale,
+        cell.noise,
+        cell.scenario,
+        (*METHODS, cell.method).index(cell.method),
+        cell.noise_level,
+    )
 
 
 def by_error(cell: Cell) -> tuple[Any, ...]:
     """Errors from none to the largest, then methods."""
-    return cell.robot_error != TrialSettings.robot_error, cell.robot_error, [*ROBOT_METHODS].index(cell.method)
+    return cell.robot_error != TrialConfig.robot_error, cell.robot_error, [*ROBOT_METHODS].index(cell.method)
 
 
 def of_robot(cell: Cell, scenarios: Sequence[str]) -> bool:
     """Whether a cell has an error of the robot, or is the same without one."""
-    same = cell.scenario in scenarios and cell.noise == TrialSettings.noise and cell.careless == 0.0
-    return same and ROBOT_METHODS.get(cell.method) == cell.level
+    same = cell.scenario in scenarios and cell.noise == TrialConfig.noise and cell.human_error_scale == 0.0
+    return same and ROBOT_METHODS.get(cell.method) == cell.noise_level
 
 
 def named(cell: Cell) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from apo_bench.benchmark.analysis import Cell, Paired, Rate, read_timing, wilson
 from apo_bench.benchmark.report.comparison.compare import compare
-from apo_bench.records import as_seen
+from apo_bench.records import is_uncorrected
 
 Of = Callable[[Cell], Hashable]
 
@@ -68,7 +68,7 @@ def together(cells: Sequence[Cell], heads: Sequence[str], row: Callable[[Cell], 
 
 def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
     """Cells in which a method that corrects ends otherwise than `paper` at any seed."""
-    asked = [p for p in pairs if p.place.method in methods and not as_seen(p.place.method) and p.pairs]
+    asked = [p for p in pairs if p.place.method in methods and not is_uncorrected(p.place.method) and p.pairs]
     apart = [p for p in asked if p.only_method or p.only_reference]
     lines = [
         f"Corrected poses against those of `paper` over the same seeds, in the {len(apart)} of {len(asked)} cells in "
@@ -82,7 +82,7 @@ def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
         at = p.place
         low, high = (100 * x for x in p.interval)
         lines.append(
-            f"| {at.scenario} | {'careless' if at.careless else 'careful'} | {at.level:g} | {at.noise} | `{at.method}` "
+            f"| {at.scenario} | {'human_error_scale' if at.human_error_scale else 'careful'} | {at.noise_level:g} | {at.noise} | `{at.method}` "
             f"| {p.pairs} | {p.only_method} | {p.only_reference} "
             f"| {100 * (p.difference or 0.0):+.1f} ({low:+.1f} to {high:+.1f}) | {p.p_adjusted:.2g} |"
         )
@@ -114,7 +114,7 @@ def worked_s(timing: Mapping[str, Any]) -> float:
 
 
 def agreed(full: Path, contact: Path) -> list[str]:
-    """How far verdicts at fidelity contact are those at fidelity full."""
+    """How far verdicts at fidelity near-contact are those at fidelity full."""
     found = compare(full, contact)
     lines = [
         "## Fidelity",

@@ -3,8 +3,8 @@
 The last operation, by a robot whose hand and eye are off by 0.5 mm and 0.1 degrees, poses corrected by the default
 corrector; trials from `--first` on, of which those count that come to the operation. `straight` does nothing, so it is
 the approach alone; `spiral` looks for the hole where the approach is stopped, from what every learner sees; `search` is
-what `contact-robust+search` does in the bench in the same trials. With `--feels`, `straight` after all that a robot
-that feels does before it, beside `contact-robust+feel`. Prints successes, and control steps a second of a core.
+what `contact-robust+spiral` does in the bench in the same trials. With `--feels`, `straight` after all that a robot
+that feels does before it, beside `contact-robust+probe`. Prints successes, and control steps a second of a core.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import gymnasium
 import numpy as np
 
 import apo_bench
-from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
 
 ERROR = "hand_eye:0.5/0.1"
 PITCH_MM = 0.35
@@ -66,7 +66,7 @@ class Spiral:
 
     def __call__(self, seen: dict[str, Any]) -> Any:
         left = float(seen["plan"][3])
-        push = -float(seen["wrench"][2])
+        push = -float(seen["ft_sensor"][2])
         action = np.zeros(7, dtype=np.float32)
         action[6] = -1.0 if left > 20 else 0.0
         if self.stopped is None or left < self.stopped - DEEP_MM:
@@ -83,7 +83,7 @@ class Spiral:
         if 0 < self.waited < PATIENCE:
             return action
         r = PITCH_MM * self.angle / (2 * math.pi)
-        if r > (YAWED_RADIUS_MM if self.yaw else RADIUS_MM) or math.hypot(*seen["wrench"][:2]) > push + SIDE_N:
+        if r > (YAWED_RADIUS_MM if self.yaw else RADIUS_MM) or math.hypot(*seen["ft_sensor"][:2]) > push + SIDE_N:
             self.yaw = (self.yaw + 1) % len(YAWS_DEG)
             self.angle = r = 0.0
         self.angle += ACROSS_MM / max(r, 0.5)
@@ -126,20 +126,20 @@ def main() -> None:
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--horizon", type=int, default=200, help="actions of an episode")
     asked.add_argument("--policies", nargs="+", choices=POLICIES, help="default: both; straight with --feels")
-    asked.add_argument("--feels", action="store_true", help="after what `+feel` does, beside `contact-robust+feel`")
+    asked.add_argument("--feels", action="store_true", help="after what `+probe` does, beside `contact-robust+probe`")
     given = asked.parse_args()
-    more = {"robot_error": ERROR, "horizon": given.horizon, "feels": given.feels}
+    more = {"robot_error": ERROR, "horizon": given.horizon, "probing": given.probing}
     env = gymnasium.make("APOInsert-v0", scenario=given.scenario, disable_env_checker=True, **more)
     trials = range(given.first, given.first + given.trials)
     right: dict[str, dict[int, bool]] = {}
-    for name in given.policies or [*POLICIES][: 1 if given.feels else 2]:
+    for name in given.policies or [*POLICIES][: 1 if given.probing else 2]:
         found = episodes(env, POLICIES[name], trials)
         right[name] = {trial: each[0] for trial, each in found.items()}
         speed = np.mean([each[2] for each in found.values()])
         print(f"{name}: {sum(right[name].values())} of {len(found)}, {speed:.0f} steps/s", flush=True)
     scene = build_scene(load_scenario(given.scenario))
-    method = "contact-robust+feel" if given.feels else "contact-robust+search"
-    settings = TrialSettings(given.scenario, method=method, robot_error=ERROR, fidelity="contact")
+    method = "contact-robust+probe" if given.probing else "contact-robust+spiral"
+    settings = TrialConfig(given.scenario, method=method, robot_error=ERROR, fidelity="near-contact")
     bench = {trial: bool(run_trial(replace(settings, seed=trial), scene)["success"]) for trial in right[name]}
     alone = [sum(right[name][t] > bench[t] for t in bench), sum(bench[t] > right[name][t] for t in bench)]
     print(f"{method}: {sum(bench.values())} of {len(bench)}; {name} and not it: {alone[0]}, the other way {alone[1]}")

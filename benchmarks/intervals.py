@@ -112,9 +112,9 @@ def mean_over_seeds(s: Setting, count: int, rng: np.random.Generator) -> np.ndar
 
 def sure_bounds(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     right = drawn(shaped(s), s, count, rng)
-    level = middle(s)
+    noise_level = middle(s)
     over, under = sure(right.sum(axis=1), np.full((count, len(LEVELS)), s.seeds))
-    return (np.r_[0.0, LEVELS][over] <= level) & (level <= np.r_[LEVELS, np.inf][len(LEVELS) - under])
+    return (np.r_[0.0, LEVELS][over] <= noise_level) & (noise_level <= np.r_[LEVELS, np.inf][len(LEVELS) - under])
 
 
 def drawn(curve: np.ndarray, s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -61,7 +61,7 @@ They are a baseline, and no good one: the spiral, which was written by hand, has
 robot that feels before it inserts nearly all. With 20 layouts an interval is 40 points wide.
 
 **Nothing to clone.** After its touches `feel` is the approach alone, actions of zero; what imitates it would be
-`straight` with `feels=True`. In 150 trials of `stick_in_tower` that has 150 right, as has `contact-robust+feel` in the
+`straight` with `feels=True`. In 150 trials of `stick_in_tower` that has 150 right, as has `contact-robust+probe` in the
 bench (`python benchmarks/insertion.py stick_in_tower --feels --first 300 --trials 150`).
 
 **What is to be felt.** Neighbours stand loose, so the approach pushes lightly where it is stopped, with 0.4 N in
@@ -76,15 +76,15 @@ BATCH = 256
 RATE = 1e-3
 
 
-def error(level: float) -> str:
+def error(noise_level: float) -> str:
     """What is wrong with the robot: hand and eye, by so many mm and a fifth of so many degrees."""
-    return f"hand_eye:{level:g}/{level / 5:g}"
+    return f"hand_eye:{noise_level:g}/{noise_level / 5:g}"
 
 
-def made(scenario: str, level: float, **more: Any) -> APOInsert:
+def made(scenario: str, noise_level: float, **more: Any) -> APOInsert:
     """The environment of a scenario, all but the error of the robot as usual."""
     env = gymnasium.make(
-        "APOInsert-v0", scenario=scenario, robot_error=error(level), disable_env_checker=True, **more
+        "APOInsert-v0", scenario=scenario, robot_error=error(noise_level), disable_env_checker=True, **more
     ).unwrapped
     assert isinstance(env, APOInsert)
     return env
@@ -102,7 +102,7 @@ def draw(folder: Path, scenarios: Sequence[str], levels: Sequence[float], episod
     for scenario in scenarios:
         began = time.process_time()
         number = len(list(folder.glob(f"{scenario}-*.npz")))
-        envs = {level: made(scenario, level, horizon=HORIZON) for level in levels}
+        envs = {noise_level: made(scenario, noise_level, horizon=HORIZON) for noise_level in levels}
         rng = np.random.default_rng([FIRST, number])
         told: list[Any] = []
         wanted: list[Any] = []
@@ -202,10 +202,10 @@ def compare(folder: Path, given: argparse.Namespace) -> None:
     lines = lines_of(folder)
     with (folder / "compare.jsonl").open("a", encoding="utf-8") as out:
         envs: dict[Any, APOInsert] = {}  # policies share the starts that one keeps
-        for scenario, level, policy in product(given.scenarios, given.levels, policies):
-            cell = {"scenario": scenario, "level": level, "policy": policy, "horizon": given.horizon}
+        for scenario, noise_level, policy in product(given.scenarios, given.noise_level, policies):
+            cell = {"scenario": scenario, "noise_level": noise_level, "policy": policy, "horizon": given.horizon}
             known = {line["trial"]: line for line in lines if cell.items() <= line.items()}
-            of = scenario, level, policy == "feel"
+            of = scenario, noise_level, policy == "feel"
             came = 0
             for trial in range(3 * given.layouts):
                 if came == given.layouts:
@@ -213,13 +213,13 @@ def compare(folder: Path, given: argparse.Namespace) -> None:
                 if trial not in known:
                     if of not in envs:
                         envs = {key: env for key, env in envs.items() if key[:2] == of[:2]}
-                        envs[of] = made(scenario, level, horizon=given.horizon, feels=of[2])
+                        envs[of] = made(scenario, noise_level, horizon=given.horizon, probing=of[2])
                     known[trial] = cell | {"trial": trial} | episode(envs[of], begun(policy, students), trial)
                     out.write(json.dumps(known[trial]) + "\n")
                     out.flush()
                 came += known[trial]["success"] is not None
             right = sum(bool(line["success"]) for line in known.values())
-            print(f"{scenario} {level:g} {policy}: {right} of {came}", flush=True)
+            print(f"{scenario} {noise_level:g} {policy}: {right} of {came}", flush=True)
     RESULT.write_text((folder / "compare.jsonl").read_text(encoding="utf-8"), encoding="utf-8")
     PAGE.write_text(page(lines_of(folder), given), encoding="utf-8")
 
@@ -282,14 +282,14 @@ alone, `spiral` the scripted search of `benchmarks/insertion.py`, `feel` the app
 | scenario | level | {" | ".join(f"`{policy}`" for policy in policies)} |
 |---|---|{"---|" * len(policies)}
 """
-    for scenario, level in product(scenarios, sorted({line["level"] for line in here})):
-        cells = [cell(scenario=scenario, level=level, policy=policy) for policy in policies]
+    for scenario, noise_level in product(scenarios, sorted({line["noise_level"] for line in here})):
+        cells = [cell(scenario=scenario, noise_level=noise_level, policy=policy) for policy in policies]
         if any(cells):
             never = " (never trained on)" if scenario in NEVER else ""
-            text += f"| `{scenario}`{never} | {level:g} | {' | '.join(cells)} |\n"
+            text += f"| `{scenario}`{never} | {noise_level:g} | {' | '.join(cells)} |\n"
     by_policy: dict[str, dict[Any, bool]] = {policy: {} for policy in policies}
     for line in here:
-        by_policy[line["policy"]][line["scenario"], line["level"], line["trial"]] = line["success"]
+        by_policy[line["policy"]][line["scenario"], line["noise_level"], line["trial"]] = line["success"]
     text += "\nTrials that both came to, and one of them has right:\n\n"
     for student, other in product(policies, POLICIES):
         if student not in POLICIES and other in by_policy:
@@ -308,7 +308,7 @@ def main() -> None:
     asked.add_argument("what", choices=("draw", "train", "compare"))
     asked.add_argument("folder", type=Path)
     asked.add_argument("--scenarios", nargs="+", help="as usual: those of training, and for compare two more")
-    asked.add_argument("--levels", type=float, nargs="+", default=LEVELS)
+    asked.add_argument("--noise-level", type=float, nargs="+", default=LEVELS)
     asked.add_argument("--episodes", type=int, default=30, help="of each scenario and round")
     asked.add_argument("--seed", type=int, default=0, help="of the training")
     asked.add_argument("--layouts", type=int, default=20)
@@ -318,7 +318,7 @@ def main() -> None:
     given = asked.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     if given.what == "draw":
-        draw(given.folder, given.scenarios or TRAINED, given.levels, given.episodes)
+        draw(given.folder, given.scenarios or TRAINED, given.noise_level, given.episodes)
     elif given.what == "train":
         train(given.folder, given.seed)
     else:

@@ -32,7 +32,7 @@ from benchmarks.made_with import with_mujoco
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "learn_ppo.jsonl"
 PAGE = ROOT / "docs" / "results" / "reinforcement.md"
-LEVEL = 0.5
+NOISE_LEVEL = 0.5
 HORIZON = 120
 TRIED = 10
 """Held-out layouts after every so many steps."""
@@ -64,7 +64,7 @@ def _told(seen: Any) -> Any:
 
 
 def env_of(scenario: str) -> Led:
-    return Led(made(scenario, LEVEL, horizon=HORIZON, reward="progress", layouts=64, first_trial=2 * FIRST))
+    return Led(made(scenario, NOISE_LEVEL, horizon=HORIZON, reward="progress", layouts=64, first_trial=2 * FIRST))
 
 
 def right(env: Led, act: Callable[[Any], Any], most: int) -> list[bool]:
@@ -113,8 +113,8 @@ def train(algorithm: str, scenario: str, steps: int, every: int, seed: int) -> I
 def _page(lines: list[dict[str, Any]]) -> Iterator[str]:
     yield from ("# Reinforcement learning, an example", "")
     yield "Written by `python -m benchmarks.learn_ppo --algorithm ALGORITHM`: PPO and SAC of Stable-Baselines3 in"
-    yield f'[`APOInsert-v0`](../guide/insertion.md), `reward="progress"`, hand and eye off by {LEVEL:g} mm and'
-    yield f"{LEVEL / 5:g} degrees. One seed each, minutes of one core; the mean action in held-out layouts, right by"
+    yield f'[`APOInsert-v0`](../guide/insertion.md), `reward="progress"`, hand and eye off by {NOISE_LEVEL:g} mm and'
+    yield f"{NOISE_LEVEL / 5:g} degrees. One seed each, minutes of one core; the mean action in held-out layouts, right by"
     yield "the judge after release. `straight` is the approach alone in the same layouts."
     yield from ("", "| algorithm | scenario | steps | minutes | right |", "|---|---|--:|--:|--:|")
     for line in lines:

@@ -20,7 +20,7 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.controller import replay
@@ -33,7 +33,7 @@ KEPT = ROOT / "benchmarks" / "results" / "profile.json"
 TIMES = ROOT / "benchmarks" / "results" / "trial_times.json"
 PAGE = ROOT / "docs" / "results" / "speed.md"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table", "peg_in_hole")
-METHODS = ("none", "paper", "paper-track")
+METHODS = ("uncorrected", "paper", "paper-track")
 SEEDS = (0, 1, 2)
 
 
@@ -88,7 +88,7 @@ def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
     try:
         for each in plans:
             began = time.process_time()
-            passed += replay(each, scene, fidelity=fidelity).sim_seconds
+            passed += replay(each, scene, fidelity=fidelity).sim_time_s
             whole += time.process_time() - began
     finally:
         mujoco.mj_step = step
@@ -109,7 +109,7 @@ def planned(scene: Scene, method: str, seed: int) -> Any:
     """What a method would have the robot do."""
     shown = simulate_demonstration(scene, 1.0, seed)
     made = apply_method(
-        method, observe_demonstration(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals
+        method, observe_demonstration(shown, make_noise("isotropic", NoiseLevel(1.0, 1.0)), seed), shown.layout.goals
     )
     assert made.plan is not None, made.failure
     return made.plan
@@ -190,7 +190,7 @@ def by_scenario(found: dict[str, Any] | None) -> list[str]:
     if found is None:
         return []
     lines = [
-        f"Other scenarios at fidelity `contact`, at {found['before']} and at {found['after']}, in turn in one run "
+        f"Other scenarios at fidelity `near-contact`, at {found['before']} and at {found['after']}, in turn in one run "
         f"(`{found['command']}`), level 1, careless humans. Seconds are of the processor, and so are the factors: "
         f"{found['load'][0]:.0f} processes wanted the {found['cores']} cores when it began, {found['load'][1]:.0f} "
         "when it ended. Numba is installed ([what for](../how/simulated.md#round-parts)); it compiles before the clock "

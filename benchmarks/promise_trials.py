@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.assembly import Observation
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.promise import explanations, plan_score
+from apo_bench.trial.predicted_success import explanations, plan_score
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
@@ -40,7 +40,7 @@ SCENES = (
 SLOW = ("gearbox",)
 """Scenarios of every `EACH`th seed, since each of their trials takes as long as a dozen others."""
 EACH = 3
-COLUMNS = ("set", "scenario", "seed", "method", "noise", "level", "robot_error", "success", "code", "score")
+COLUMNS = ("set", "scenario", "seed", "method", "noise", "noise_level", "robot_error", "success", "code", "score")
 
 
 class Condition(NamedTuple):
@@ -48,17 +48,17 @@ class Condition(NamedTuple):
 
     method: str
     noise: str
-    level: float = 1.0
+    noise_level: float = 1.0
     robot_error: str = "none"
 
 
 CONDITIONS = (
     *(Condition("contact-robust", noise) for noise in ("megapose-tless", "benchmarks/gross.toml")),
     *(Condition("contact-robust", kind) for kind in ("flips", "stale", "swaps", "rays", "displaced-view")),
-    *(Condition("contact-robust", "isotropic", level) for level in (8.0, 2.0)),
+    *(Condition("contact-robust", "isotropic", noise_level) for noise_level in (8.0, 2.0)),
     *(Condition("contact", noise) for noise in ("megapose-tless", "stale", "flips")),
-    *(Condition("snap", "isotropic", level) for level in (0.1, 0.25)),
-    Condition("none", "isotropic", 0.1),
+    *(Condition("snap", "isotropic", noise_level) for noise_level in (0.1, 0.25)),
+    Condition("uncorrected", "isotropic", 0.1),
     *(
         Condition("contact-robust", "isotropic", 1.0, error)
         for error in ("hand_eye:0.25/0.05", "hand_eye:0.1/0.02", "tool:0.25", "in_hand:0.25/0.5", "joints:0.02")
@@ -122,39 +122,39 @@ def _scene(scenario: str) -> Scene:
     return scene_of(_settings(scenario, loaded.clearance_mm, 0, CONDITIONS[0]), loaded)
 
 
-def _settings(scenario: str, clearance_mm: float, seed: int, condition: Condition) -> TrialSettings:
-    level = condition.level
+def _settings(scenario: str, clearance_mm: float, seed: int, condition: Condition) -> TrialConfig:
+    noise_level = condition.noise_level
     named = condition._asdict()
-    del named["level"]
-    return TrialSettings(
+    del named["noise_level"]
+    return TrialConfig(
         scenario,
-        level_mm=level,
-        level_deg=level,
+        noise_mm=noise_level,
+        noise_deg=noise_level,
         clearance_mm=clearance_mm,
         seed=seed,
-        fidelity="contact",
+        fidelity="near-contact",
         **named,
     )
 
 
 def _trials(kind: str, name: str, scenario: str, scene: Scene, seed: int) -> Iterator[Line]:
     first = _settings(scenario, scene.clearance_mm, seed, CONDITIONS[0])
-    simulated = simulate_demonstration(scene, first.careless, seed)
+    simulated = simulate_demonstration(scene, first.human_error_scale, seed)
     cache = ReplayCache()
     for condition in CONDITIONS if simulated.demonstration.code == "ok" else ():
         success, code, score = _trial(replace(first, **_fields(condition)), scene, simulated, cache)
-        cells = (kind, name, seed, *condition._replace(level=f"{condition.level:g}"), success, code, score)
+        cells = (kind, name, seed, *condition._replace(noise_level=f"{condition.noise_level:g}"), success, code, score)
         yield dict(zip(COLUMNS, map(str, cells), strict=True))
 
 
 def _fields(condition: Condition) -> dict[str, object]:
     fields = condition._asdict()
-    level = fields.pop("level")
-    return fields | {"level_mm": level, "level_deg": level}
+    noise_level = fields.pop("noise_level")
+    return fields | {"noise_mm": noise_level, "noise_deg": noise_level}
 
 
 def _trial(
-    settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, cache: ReplayCache
+    settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, cache: ReplayCache
 ) -> tuple[str, str, str]:
     """Success, code and score, as they are saved."""
     seen: Observation = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed)

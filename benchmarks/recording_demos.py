@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.assembly import Layout
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import WORKSPACE_MIDDLE_M
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
@@ -61,12 +61,12 @@ class _Watch:
         self.T.append({part: part_pose(self._scene.shown, data, part) for part in self._scene.shown.free})
 
 
-def watched(scenario: str, seed: int, careless: float = 1.0) -> Truth | None:
+def watched(scenario: str, seed: int, human_error_scale: float = 1.0) -> Truth | None:
     """A simulated demonstration; None if it failed itself."""
-    scene = scene_of(TrialSettings(scenario=scenario, seed=seed))
+    scene = scene_of(TrialConfig(scenario=scenario, seed=seed))
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT), scene.clearance_mm)
     watch = _Watch(scene)
-    done = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION), watch)
+    done = demonstrate(scene, layout, human_error_scale, stream(seed, DEMONSTRATION), watch)
     if done.code != "ok":
         return None
     still = np.arange(-BEFORE_S, -0.5 / RATE_HZ, 1.0 / RATE_HZ)

@@ -17,7 +17,7 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import Cell, tally, wilson
-from apo_bench.records import Row, TrialSettings
+from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.records.run.run_folder import read_rows
 from benchmarks.feel_acts import Line, lines_of, table
 from benchmarks.made_with import mujoco_of, states_of_code, with_mujoco
@@ -51,7 +51,7 @@ Simulated seconds of a trial, at the median, over all errors.
 OTHERS = """
 ## Other sensors, statements, arms and scenarios
 
-The sensor is that of the wrist (`--wrench`), and stated is how wrong the robot was said to be (`--stated-error`).
+The sensor is that of the wrist (`--ft-sensor`), and stated is how wrong the robot was said to be (`--assumed-robot-error`).
 """
 ACTS = """
 ## Each act left out
@@ -61,7 +61,7 @@ Errors of all kinds together, as in the last line of the first table, by `python
 many trials only the robot with all acts got right, and how many only this one.
 """
 SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
-USUAL = {"arm": "six_axis", "wrench": TrialSettings.wrench, "stated_error": TrialSettings.stated_error}
+USUAL = {"arm": "six_axis", "ft_sensor": TrialConfig.ft_sensor, "assumed_robot_error": TrialConfig.assumed_robot_error}
 OTHER_KEYS = ("robot_error", *USUAL)
 TAUGHT = """
 Contacts repair the eye's error, not the robot's own: with one, `oracle`, which knows the truth, fails. A robot that
@@ -84,7 +84,7 @@ def main() -> None:
     print(f"Wrote {PAGE}")
 
 
-def page(every: Iterable[Row], acts: Sequence[Line] = ()) -> str:
+def page(every: Iterable[TrialRecord], acts: Sequence[Line] = ()) -> str:
     every = list(every)
     rows = [row for row in every if row["scenario"] in SCENARIOS and all(row[k] == v for k, v in USUAL.items())]
     others = [row for row in every if row not in rows]
@@ -98,7 +98,7 @@ def page(every: Iterable[Row], acts: Sequence[Line] = ()) -> str:
     each = [[of.get((error, *at), "") for at in columns] for error in errors]
     heads = [f"`{method}`, {scenario}" for method, scenario in columns]
     cost = [
-        [_median(r["sim_seconds"] for r in rows if (r["method"], r["scenario"]) == (m, s)) for s in scenarios]
+        [_median(r["sim_time_s"] for r in rows if (r["method"], r["scenario"]) == (m, s)) for s in scenarios]
         for m in methods
     ]
     return (
@@ -114,7 +114,7 @@ def page(every: Iterable[Row], acts: Sequence[Line] = ()) -> str:
     )
 
 
-def _others(rows: Sequence[Row]) -> str:
+def _others(rows: Sequence[TrialRecord]) -> str:
     """One line for each combination that is not the usual one."""
     cells = Counter((*(row[key] for key in OTHER_KEYS), row["scenario"], row["method"]) for row in rows)
     won = Counter((*(r[key] for key in OTHER_KEYS), r["scenario"], r["method"]) for r in rows if r["success"])

@@ -18,7 +18,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import tango, wilson
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_rows
 from benchmarks.asked import ROBUST, block
 from benchmarks.made_with import mujoco_of, with_mujoco
@@ -38,12 +38,12 @@ class Place(NamedTuple):
     """One cell."""
 
     noise: str
-    level: float
+    noise_level: float
     clearance_mm: float
-    careless: float
+    human_error_scale: float
     scenario: str
     method: str
-    looks: int
+    max_reobservations: int
 
 
 class Count(NamedTuple):
@@ -70,34 +70,37 @@ def main() -> None:
     print(f"Wrote {KEPT} and {PAGE}")
 
 
-def counted(rows: Iterable[Row]) -> dict[Place, Count]:
+def counted(rows: Iterable[TrialRecord]) -> dict[Place, Count]:
     found: dict[Place, list[bool]] = defaultdict(list)
     for row in rows:
         found[place_of(row)].append(bool(row["success"]))
     return {place: Count(len(ends), sum(ends)) for place, ends in found.items()}
 
 
-def place_of(row: Row) -> Place:
-    looks = int(row["looks"] or 0) if row["method"] == "contact-robust" else 0
-    given = (row["level"], row["clearance_mm"], row["careless"])
-    return Place(str(row["noise"]), *map(float, given), str(row["scenario"]), str(row["method"]), looks)
+def place_of(row: TrialRecord) -> Place:
+    max_reobservations = int(row["max_reobservations"] or 0) if row["method"] == "contact-robust" else 0
+    given = (row["noise_mm"], row["clearance_mm"], row["human_error_scale"])
+    return Place(str(row["noise"]), *map(float, given), str(row["scenario"]), str(row["method"]), max_reobservations)
 
 
-def page(rows: list[Row], cells: Mapping[Place, Count]) -> list[str]:
+def page(rows: list[TrialRecord], cells: Mapping[Place, Count]) -> list[str]:
     scenarios = sorted({place.scenario for place in cells})
     return [
         HEADING,
         "",
         "Written by `python benchmarks/robust.py` from sweeps of `benchmarks/robust.toml`; counts in "
         "`benchmarks/results/robust.csv`. Success: the finished assembly is right; Wilson's 95 % intervals, the four "
-        "tasks pooled, the same seeds for every method. `--looks N` lets `contact-robust` see operations again up to "
+        "tasks pooled, the same seeds for every method. `--max-reobservations N` lets `contact-robust` see operations again up to "
         "N times, with the same noise, outliers included.",
         "",
         block(ROBUST),
         "",
         f"| noise, level 1 | method | looks | all | {' | '.join(scenarios)} |",
         f"|---|---|---|---|{'---|' * len(scenarios)}",
-        *(line(noise, method, looks, scenarios, cells) for noise, method, looks in lines(cells)),
+        *(
+            line(noise, method, max_reobservations, scenarios, cells)
+            for noise, method, max_reobservations in lines(cells)
+        ),
         "",
         "Paired differences of `contact-robust` without looks and `contact`, with Tango's 95 % intervals:",
         "",
@@ -111,32 +114,36 @@ def page(rows: list[Row], cells: Mapping[Place, Count]) -> list[str]:
 
 
 def lines(cells: Mapping[Place, Count]) -> list[tuple[str, str, int]]:
-    return sorted({(place.noise, place.method, place.looks) for place in cells if place.noise != PLAIN})
+    return sorted({(place.noise, place.method, place.max_reobservations) for place in cells if place.noise != PLAIN})
 
 
-def line(noise: str, method: str, looks: int, scenarios: list[str], cells: Mapping[Place, Count]) -> str:
-    each = [pooled(cells, noise, method, looks, (scenario,)) for scenario in scenarios]
-    whole = pooled(cells, noise, method, looks, scenarios)
+def line(noise: str, method: str, max_reobservations: int, scenarios: list[str], cells: Mapping[Place, Count]) -> str:
+    each = [pooled(cells, noise, method, max_reobservations, (scenario,)) for scenario in scenarios]
+    whole = pooled(cells, noise, method, max_reobservations, scenarios)
     low, high = wilson(whole.successes, whole.trials)
     said = " | ".join(f"{one.successes} of {one.trials}" for one in each)
     rate = f"{100 * whole.successes / whole.trials:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
-    shown = looks if method == "contact-robust" else ""
+    shown = max_reobservations if method == "contact-robust" else ""
     return f"| {NAMES.get(noise, f'`{noise}`')} | `{method}` | {shown} | {rate} | {said} |"
 
 
-def pooled(cells: Mapping[Place, Count], noise: str, method: str, looks: int, scenarios: Iterable[str]) -> Count:
+def pooled(
+    cells: Mapping[Place, Count], noise: str, method: str, max_reobservations: int, scenarios: Iterable[str]
+) -> Count:
     wanted = set(scenarios)
     each = [
-        n for p, n in cells.items() if (p.noise, p.method, p.looks) == (noise, method, looks) and p.scenario in wanted
+        n
+        for p, n in cells.items()
+        if (p.noise, p.method, p.max_reobservations) == (noise, method, max_reobservations) and p.scenario in wanted
     ]
     return Count(sum(n.trials for n in each), sum(n.successes for n in each))
 
 
-def difference(noise: str, rows: Iterable[Row]) -> str:
+def difference(noise: str, rows: Iterable[TrialRecord]) -> str:
     ends: dict[tuple[object, ...], dict[str, bool]] = defaultdict(dict)
     for row in rows:
         place = place_of(row)
-        if place.noise == noise and place.looks == 0:
+        if place.noise == noise and place.max_reobservations == 0:
             ends[*place[:5], row["seed"]][place.method] = bool(row["success"])
     pairs = [
         (end["contact"], end["contact-robust"]) for end in ends.values() if {"contact", "contact-robust"} <= set(end)

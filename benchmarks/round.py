@@ -19,7 +19,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import wilson
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_rows
 from benchmarks.asked import ROUND, block
 from benchmarks.made_with import mujoco_of, with_mujoco
@@ -27,12 +27,12 @@ from benchmarks.made_with import mujoco_of, with_mujoco
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "round.csv"
 PAGE = ROOT / "docs" / "results" / "round.md"
-METHODS = ("oracle", "none", "search", "by-heart", "snap", "snap+search", "paper", "contact")
-CHAINED = ("none", "search", "paper", "contact")
+METHODS = ("oracle", "uncorrected", "spiral-search", "nominal", "snap", "snap+spiral", "paper", "contact")
+CHAINED = ("uncorrected", "spiral-search", "paper", "contact")
 """Methods of the table of one long chain."""
-PLAY = ("oracle", "none", "search", "contact")
+PLAY = ("oracle", "uncorrected", "spiral-search", "contact")
 """Methods of the table of less play."""
-RECOGNISED = "recognised"
+DETECTED = "detected"
 CHAIN = "gearbox"
 """Ten operations, one on the other."""
 LEVELS = (0.0, 1.0, 2.0)
@@ -46,9 +46,9 @@ class Place(NamedTuple):
 
     scenario: str
     clearance_mm: float
-    careless: float
-    level: float
-    relations: str
+    human_error_scale: float
+    noise_level: float
+    contact_source: str
     method: str
 
 
@@ -77,33 +77,33 @@ def main() -> None:
     print(f"Wrote {KEPT} and {PAGE}")
 
 
-def judged(folders: Iterable[Path]) -> list[Row]:
+def judged(folders: Iterable[Path]) -> list[TrialRecord]:
     """Rows with a verdict, each trial once."""
     rows = {(place_of(row), row["seed"]): row for folder in folders for row in read_rows(folder)}
     return [row for row in rows.values() if row["success"] is not None]
 
 
-def grouped(rows: Iterable[Row]) -> dict[Place, list[Row]]:
-    found: dict[Place, list[Row]] = defaultdict(list)
+def grouped(rows: Iterable[TrialRecord]) -> dict[Place, list[TrialRecord]]:
+    found: dict[Place, list[TrialRecord]] = defaultdict(list)
     for row in rows:
         found[place_of(row)].append(row)
     return found
 
 
-def place_of(row: Row) -> Place:
-    numbers = (float(row[name] or 0.0) for name in ("clearance_mm", "careless", "level"))  # type: ignore[literal-required]
-    return Place(str(row["scenario"]), *numbers, str(row["relations"]), str(row["method"]))
+def place_of(row: TrialRecord) -> Place:
+    numbers = (float(row[name] or 0.0) for name in ("clearance_mm", "human_error_scale", "noise_mm"))  # type: ignore[literal-required]
+    return Place(str(row["scenario"]), *numbers, str(row["contact_source"]), str(row["method"]))
 
 
-def cell_of(rows: list[Row]) -> Cell:
+def cell_of(rows: list[TrialRecord]) -> Cell:
     errors = [row["planned_error_fixed_mm"] for row in rows if row["planned_error_fixed_mm"] is not None]
     right = None
-    if rows[0]["relations"] == RECOGNISED:
-        right = sum(row["contacts_missed"] == 0 and row["contacts_false"] == 0 for row in rows)
+    if rows[0]["contact_source"] == DETECTED:
+        right = sum(row["contacts_false_negative"] == 0 and row["contacts_false_positive"] == 0 for row in rows)
     return Cell(len(rows), sum(bool(row["success"]) for row in rows), right, round(median(errors or [0.0]), 3))
 
 
-def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[str]:
+def page(cells: Mapping[Place, Cell], rows: list[TrialRecord], half: list[TrialRecord]) -> list[str]:
     return [
         "# Round and tilted faces",
         "",
@@ -125,7 +125,7 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
         "",
         "## Contacts found in the seen poses",
         "",
-        "At level 0.5, `--relations recognised`: trials in which every contact was found and no other, and success of "
+        "At level 0.5, `--contact-source detected`: trials in which every contact was found and no other, and success of "
         "`contact` with what was found.",
         "",
         *recognition_table(cells),
@@ -147,8 +147,8 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
 
 
 def success_table(cells: Mapping[Place, Cell]) -> list[str]:
-    plain = {p: c for p, c in cells.items() if p.clearance_mm == float(SHOWN) and p.relations == "given"}
-    lines = sorted({(p.scenario, p.careless, p.level) for p in plain if p.method != "oracle"})
+    plain = {p: c for p, c in cells.items() if p.clearance_mm == float(SHOWN) and p.contact_source == "given"}
+    lines = sorted({(p.scenario, p.human_error_scale, p.noise_level) for p in plain if p.method != "oracle"})
     lines = [line for line in lines if line[0] != CHAIN or line[2] in LEVELS]
     made = [
         f"| scenario | human | level | {' | '.join(f'`{m}`' for m in METHODS[1:])} | planned wrong by, mm |",
@@ -157,11 +157,13 @@ def success_table(cells: Mapping[Place, Cell]) -> list[str]:
     for scenario in sorted({p.scenario for p in plain}):
         told = [c for p, c in plain.items() if p.scenario == scenario and p.method == "oracle"]
         made.append(f"| {scenario} | `oracle` | | {rate(sum_of(told))}{' |' * len(METHODS)}")
-        for _, careless, level in (line for line in lines if line[0] == scenario):
-            each = {m: plain.get(Place(scenario, float(SHOWN), careless, level, "given", m)) for m in METHODS}
+        for _, human_error_scale, noise_level in (line for line in lines if line[0] == scenario):
+            each = {
+                m: plain.get(Place(scenario, float(SHOWN), human_error_scale, noise_level, "given", m)) for m in METHODS
+            }
             said = " | ".join(rate(each[m]) for m in METHODS[1:])
-            wrong = ", ".join(f"{found.error_mm:.2f}" for m in ("none", "contact") if (found := each[m]))
-            made.append(f"| {scenario} | {human(careless)} | {level:g} | {said} | {wrong} |")
+            wrong = ", ".join(f"{found.error_mm:.2f}" for m in ("uncorrected", "contact") if (found := each[m]))
+            made.append(f"| {scenario} | {human(human_error_scale)} | {noise_level:g} | {said} | {wrong} |")
     return made
 
 
@@ -170,10 +172,12 @@ def play_table(cells: Mapping[Place, Cell]) -> list[str]:
         "| scenario | play, mm | level | `oracle` | `none` | `search` | `contact` |",
         "|---|---|---|---|---|---|---|",
     ]
-    less = {p: c for p, c in cells.items() if p.clearance_mm < float(SHOWN) and p.relations == "given"}
-    for scenario, play, level in sorted({(p.scenario, p.clearance_mm, p.level) for p in less}):
-        each = (Place(scenario, play, 0.0, level, "given", method) for method in PLAY)
-        made.append(f"| {scenario} | {play:g} | {level:g} | {' | '.join(rate(less.get(place)) for place in each)} |")
+    less = {p: c for p, c in cells.items() if p.clearance_mm < float(SHOWN) and p.contact_source == "given"}
+    for scenario, play, noise_level in sorted({(p.scenario, p.clearance_mm, p.noise_level) for p in less}):
+        each = (Place(scenario, play, 0.0, noise_level, "given", method) for method in PLAY)
+        made.append(
+            f"| {scenario} | {play:g} | {noise_level:g} | {' | '.join(rate(less.get(place)) for place in each)} |"
+        )
     return made
 
 
@@ -182,26 +186,32 @@ def recognition_table(cells: Mapping[Place, Cell]) -> list[str]:
     for place, cell in sorted(cells.items()):
         if cell.all_contacts_right is not None:
             right = rate(Cell(cell.trials, cell.all_contacts_right, None, 0.0))
-            made.append(f"| {place.scenario} | {human(place.careless)} | {right} | {rate(cell)} |")
+            made.append(f"| {place.scenario} | {human(place.human_error_scale)} | {right} | {rate(cell)} |")
     return made
 
 
-def chain_table(rows: Iterable[Row]) -> list[str]:
+def chain_table(rows: Iterable[TrialRecord]) -> list[str]:
     made = [
         "| level | `none` | `search` | `paper` | `contact` | planned: `none` | `paper` | `contact` | left off: fixed "
         "| free | `none` fails at |",
         "|---|" + "---|" * 10,
     ]
-    mine = [row for row in rows if (row["scenario"], row["careless"], row["relations"]) == (CHAIN, 0.0, "given")]
-    for level in sorted({float(row["level"] or 0.0) for row in mine}):
-        of = {m: [row for row in mine if row["method"] == m and row["level"] == level] for m in CHAINED}
+    mine = [
+        row
+        for row in rows
+        if (row["scenario"], row["human_error_scale"], row["contact_source"]) == (CHAIN, 0.0, "given")
+    ]
+    for noise_level in sorted({float(row["noise_mm"] or 0.0) for row in mine}):
+        of = {m: [row for row in mine if row["method"] == m and row["noise_mm"] == noise_level] for m in CHAINED}
         if all(of.values()):
-            planned = [middle(row["planned_error_fixed_mm"] for row in of[m]) for m in ("none", "paper", "contact")]
+            planned = [
+                middle(row["planned_error_fixed_mm"] for row in of[m]) for m in ("uncorrected", "paper", "contact")
+            ]
             ends = [
                 middle(row[name] for row in of["contact"]) for name in ("pose_error_fixed_mm", "pose_error_free_mm")
             ]
-            failed = [row["failure_operation"] for row in of["none"] if not row["success"]]
-            said = [f"{level:g}", *(rate(cell_of(of[m])) for m in CHAINED), *planned, *ends, middle(failed, 0)]
+            failed = [row["failure_operation"] for row in of["uncorrected"] if not row["success"]]
+            said = [f"{noise_level:g}", *(rate(cell_of(of[m])) for m in CHAINED), *planned, *ends, middle(failed, 0)]
             made.append(f"| {' | '.join(said)} |")
     return made
 
@@ -211,7 +221,7 @@ def middle(numbers: Iterable[float | None], digits: int = 2) -> str:
     return f"{median(told):.{digits}f}" if told else ""
 
 
-def half_table(rows: list[Row], half: list[Row]) -> list[str]:
+def half_table(rows: list[TrialRecord], half: list[TrialRecord]) -> list[str]:
     ends = {(place_of(row), row["seed"]): bool(row["success"]) for row in rows}
     pairs: dict[str, list[bool]] = defaultdict(list)
     for row in half:
@@ -239,8 +249,8 @@ def rate(cell: Cell | None) -> str:
     return f"{cell.successes} of {cell.trials} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 
-def human(careless: float) -> str:
-    return "careless" if careless else "careful"
+def human(human_error_scale: float) -> str:
+    return "human_error_scale" if human_error_scale else "careful"
 
 
 if __name__ == "__main__":

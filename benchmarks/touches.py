@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from scipy.stats import chi2
 
-from apo_bench.correction.calibration import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, RobotBelief, Touch, believe, slip_sigmas
 from apo_bench.geometry import Array, pose
 from apo_bench.records import robot_sigmas
 from apo_bench.records.robot_error import Sigmas
@@ -220,7 +220,7 @@ def in_mm(off: Array) -> Array:
 
 
 def stated(name: str) -> Sigmas:
-    return UNSTATED if name == "not stated" else robot_sigmas(name)
+    return UNKNOWN if name == "not stated" else robot_sigmas(name)
 
 
 def summary(draws: int, name: str, sigma_um: float, outlier_mm: float = 0.0) -> dict[str, object]:

@@ -1,10 +1,10 @@
 """What a trial takes, at a commit and today, in turn: `python benchmarks/trial_times.py COMMIT` (ten minutes, a core).
 
-The four examples of the paper, methods `none`, `paper` and `contact` at level 1 with careless humans: each trial with
+The four examples of the paper, methods `uncorrected`, `paper` and `contact` at level 1 with careless humans: each trial with
 its demonstration, from settings to row, as `run_trial` makes it from a scene that is compiled. Each of the two packages
 runs in a process of its own, and the same trial is run by one and then by the other, so that a machine whose speed
 drifts treats both alike. Writes results/trial_times.json, which `python benchmarks/profiling.py` puts on its page.
-With `--scenarios` others are timed at fidelity `contact`, each by itself, with the time that its scene takes to be
+With `--scenarios` others are timed at fidelity `near-contact`, each by itself, with the time that its scene takes to be
 built, and are kept beside those.
 """
 
@@ -28,7 +28,7 @@ from typing import IO, Any
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "trial_times.json"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
-METHODS = ("none", "paper", "contact")
+METHODS = ("uncorrected", "paper", "contact")
 FIDELITIES = ("full", "contact")
 
 Told = Mapping[str, Any]
@@ -38,7 +38,7 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("commit", nargs="?", help="the commit to compare with, such as 7a4d1df")
     asked.add_argument("--seeds", type=int, default=5, help="seeds of each kind of trial")
-    asked.add_argument("--scenarios", nargs="+", help="time these, at fidelity contact, each by itself")
+    asked.add_argument("--scenarios", nargs="+", help="time these, at fidelity near-contact, each by itself")
     asked.add_argument("--serve", action="store_true", help="run the trials that standard input asks for")
     given = asked.parse_args()
     if given.serve:
@@ -71,9 +71,9 @@ def cases(seed: int, scenarios: Sequence[str], fidelities: Sequence[str]) -> Ite
     for scenario, method, fidelity in product(scenarios, METHODS, fidelities):
         yield {
             "scenario": scenario,
-            "level_mm": 1.0,
-            "level_deg": 1.0,
-            "careless": 1.0,
+            "noise_mm": 1.0,
+            "noise_deg": 1.0,
+            "human_error_scale": 1.0,
             "seed": seed,
             "method": method,
             "fidelity": fidelity,
@@ -98,7 +98,7 @@ def ask(process: Any, told: Told) -> Told:
 
 def serve(asked: IO[str], answers: IO[str]) -> None:
     """Run one trial after the other; what is imported and compiled is at hand from the second of a scenario on."""
-    from apo_bench.records import TrialSettings
+    from apo_bench.records import TrialConfig
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.trial import run_trial
@@ -106,7 +106,7 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
     scenes: dict[str, Any] = {}
     building: dict[str, float] = {}
     for line in asked:
-        settings = TrialSettings(**json.loads(line))
+        settings = TrialConfig(**json.loads(line))
         name = str(settings.scenario)
         if name not in scenes:
             scenario = load_scenario(name)
@@ -122,7 +122,7 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
         said = {
             "wall_s": time.perf_counter() - began,
             "cpu_s": time.process_time() - worked,
-            "sim_s": row["sim_seconds"],
+            "sim_s": row["sim_time_s"],
             "scene_s": building[name],
             "verdict": [row["success"], row["as_demonstrated"]],
         }

@@ -24,8 +24,8 @@ from apo_bench import Assembly, Demonstration, Observation, draw_layout, load_sc
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.relations import make_relations, with_relations
-from benchmarks.failures import LEVEL, right
+from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from benchmarks.failures import NOISE_LEVEL, right
 from benchmarks.failures_page import ROOT, put
 
 SCENES = (
@@ -37,8 +37,12 @@ SCENES = (
     "peg_in_hole",
     "gearbox",
 )
-KINDS = {"false": "a contact that is none", "missed": "a contact missing", "shifted:3": "a face 3 mm off"}
-ASKED = {"false": 95, "missed": 54, "shifted:3": 75}
+KINDS = {
+    "false-positive": "a contact that is none",
+    "false-negative": "a contact missing",
+    "shifted:3": "a face 3 mm off",
+}
+ASKED = {"false-positive": 95, "false-negative": 54, "shifted:3": 75}
 """Of all draws, [%]."""
 CORRECTORS = ("told", "contact", "contact-drop", "contact-robust")
 KEPT = ROOT / "benchmarks" / "results" / "wrong_relations.csv"
@@ -71,8 +75,8 @@ def ends(seed: int, kind: str, scene: str) -> list[str]:
     layout = draw_layout(scenario, np.random.default_rng([seed, 32, 0]), 0.0)
     nothing = np.zeros((len(layout.goals), 6, 6))
     shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
-    seen = observe(shown, make_noise("isotropic", LEVEL), np.random.default_rng([seed, 32, 1]))
-    wrong = with_relations(seen, make_relations(kind), layout.goals, np.random.default_rng([seed, 32, 2]))
+    seen = observe(shown, make_noise("isotropic", NOISE_LEVEL), np.random.default_rng([seed, 32, 1]))
+    wrong = with_contacts(seen, make_contacts(kind), layout.goals, np.random.default_rng([seed, 32, 2]))
     found = ["draws"]
     for name in CORRECTORS:
         given = wrong if name != "told" else replace(seen, assembly=without_wrong(seen.assembly, wrong.assembly))

@@ -19,7 +19,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, ReplayResult
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -115,8 +115,8 @@ def main(names: list[str]) -> None:
 def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
     shown = simulate_demonstration(scene, 1.0, SEED)
-    seen = observe_demonstration(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
-    raw = apply_method("none", seen, None).plan
+    seen = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(0.0, 0.0)), SEED)
+    raw = apply_method("uncorrected", seen, None).plan
     corrected = apply_method(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"
     assert corrected is not None, f"{strip.method} corrects {name}"

@@ -23,55 +23,65 @@ from msgspec.inspect import (
     type_info,
 )
 
-from apo_bench.cli.setting_options import axis_flag
 from apo_bench.records import (
     CODES,
     KEY,
     LARGEST_NUMBER,
+    RECORD_FIELDS,
+    RECORD_SCHEMA,
     REQUIRED,
-    ROW,
-    ROW_FIELDS,
     SETTINGS,
     STAGES,
-    Row,
     SettingInfo,
-    TrialSettings,
+    TrialConfig,
+    TrialRecord,
 )
 
 SETTINGS_HEAD = """# Settings of a trial
 
-With the same code and the same files these settings determine the row of a trial. In Python they are the fields of
-`TrialSettings`; `apo-bench replay` takes them as options. A sweep varies those that have an axis: a field of
-`SweepSettings`, a key of a sweep file and an option of `apo-bench sweep`. `--level L` stands for
-`--level-mm L --level-deg L`; its axis is `levels`.
+With the same version and the same files these settings determine the record of a trial. They have one name everywhere:
+fields of `TrialConfig` and `SweepConfig`, keys of a sweep file, arguments of the environments and options of
+`apo-bench`. A sweep takes several values of some of them, and one of others. `noise_level` sets `noise_mm` and
+`noise_deg`.
 """
-ROW_HEAD = f"""# Columns of a row
+ROW_HEAD = f"""# Columns of a trial record
 
-A row is what is kept of one trial: one JSON object, one line of `trials.jsonl`, of schema `{ROW}`. Lengths are in mm,
-angles in degrees, quaternions are wxyz, operations are numbered from 1. The columns of the *key* tell the trials of one
-sweep apart; *needed* is what every row must say besides. A column that may be null may also be left out.
+The record of a trial is one JSON object, one line of `trials.jsonl`, of schema `{RECORD_SCHEMA}`. Lengths are in mm,
+angles in degrees, quaternions are wxyz, operations are numbered from 1. The columns of the *key* distinguish the trials of
+one sweep; *needed* columns are in every record. A column that may be null may also be left out.
 """
+FIRST = {
+    "schema": "Version of these columns.",
+    "env_id": "Version of the environment.",
+    "config_hash": "16 hexadecimal digits of a hash of the version, the files and all settings but method and seed: "
+    "records with the same may be counted together.",
+    "secret_seed": "Hash of the secret seed that the trial was drawn with; null for one that anyone can draw.",
+}
 FEW = 4
 """Words of a closed list that fit in a table."""
 
 
 def settings_page() -> str:
     """The page of settings, as Markdown."""
-    said = sentences(TrialSettings)
-    lines = [SETTINGS_HEAD, "| setting | meaning | value | default | option | axis |", "|---|---|---|---|---|---|"]
+    said = sentences(TrialConfig)
+    lines = [
+        SETTINGS_HEAD,
+        "| setting | meaning | value | default | option | values in a sweep |",
+        "|---|---|---|---|---|---|",
+    ]
     for name, info in SETTINGS.items():
         option = f"`--{info.option}`" if info.help else "argument"
         default = "" if info.default is MISSING else info.usual or f"`{info.default}`"
-        axis = [f"`{info.axis}`"] * bool(info.axis) + [f"`{axis_flag(info)}`"] * bool(info.axis and info.help)
-        lines.append(f"| `{name}` | {said[name]} | {value_of(info)} | {default} | {option} | {', '.join(axis)} |")
+        axis = "several" if info.axis or (info.drawn and info.help) else "one" if info.shared else ""
+        lines.append(f"| `{name}` | {said[name]} | {value_of(info)} | {default} | {option} | {axis} |")
     return "\n".join(lines) + "\n"
 
 
 def row_page() -> str:
     """The page of columns, as Markdown."""
-    said = sentences(Row)
+    said = sentences(TrialConfig) | sentences(TrialRecord) | FIRST
     lines = [ROW_HEAD, "| column | meaning | value | null | |", "|---|---|---|---|---|"]
-    for column, kind in ROW_FIELDS.items():
+    for column, kind in RECORD_FIELDS.items():
         value, null = without_null(type_info(kind))
         need = "key" if column in KEY else "needed" if column in REQUIRED else ""
         lines.append(f"| `{column}` | {said[column]} | {words(value)} | {'yes' if null else ''} | {need} |")
@@ -96,7 +106,7 @@ def value_of(info: SettingInfo) -> str:
     """What a setting may be, in words."""
     if info.choices:
         return " or ".join(f"`{choice}`" for choice in info.choices)
-    return "a secret in a file" if info.name == "salt" else words(type_info(info.kind))
+    return "a secret in a file" if info.name == "secret_seed" else words(type_info(info.kind))
 
 
 def without_null(kind: Type) -> tuple[Type, bool]:

@@ -79,7 +79,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "parts": "one table per part: `[parts.NAME]`",
             "operations": "one table per operation, in order: `[[operations]]`",
             "site": "where the assembly stands; else at the origin of the table",
-            "careless": "the error of the person; else there is none",
+            "human_error_scale": "the error of the person; else there is none",
             "judge": "thresholds of the verdict",
         },
         "parts.NAME": {
@@ -128,10 +128,10 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "spread_mm": "how far from it in x and y, to either side",
             "yaw_deg": "lowest and highest turn about the vertical",
         },
-        "careless": {
+        "human_error_scale": {
             "operation": "number of the operation that goes wrong, from 1",
             "along": f"direction of the error, level at the goal; {SHIFT}",
-            "size_mm": "lowest and highest size, to either side; `careless` of a trial scales it",
+            "size_mm": "lowest and highest size, to either side; `human_error_scale` of a trial scales it",
         },
         "judge": {
             "success": "`assembled` (else) or `as_demonstrated`: which verdict counts as success",
@@ -265,7 +265,7 @@ def scenario_keys() -> Keys:
         "operations, grasp": scenario_tables.GraspTable,
         "operations, vary": scenario_tables.VaryTable,
         "site": scenario_tables.SiteTable,
-        "careless": scenario_tables.CarelessTable,
+        "human_error_scale": scenario_tables.HumanErrorTable,
         "judge": scenario_tables.JudgeTable,
     }
     return {table: keys_of(of) for table, of in types.items()}

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.correction.correctors import correct
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.viz.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"
-LEVEL = Level(1.0, 1.0)
+NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 INTRODUCTION = """
 `--noise` takes the names below. [Your own noise](../guide/noise.md) says how to write another one.
 
@@ -31,7 +31,7 @@ of the world frame; what was not seen says so; what was seen reaches the robot b
 
 Tables show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part:
 their standard deviation, the one that observations state, and percentiles of their size. `apo-bench noise card NAME`
-prints a card, with `--level` at another level.
+prints a card, with `--noise-level` at another level.
 """
 
 TRIALS = 200
@@ -52,7 +52,7 @@ does not explain the correction. All relations are right, so that is a false ala
 def row(name: str) -> str:
     """What `contact` makes of one model, as a line of the table."""
     shown = nominal_demonstration()
-    noise = make_noise(name, LEVEL)
+    noise = make_noise(name, NOISE_LEVEL)
     whole = 0
     fails = 0
     seen_off = []
@@ -73,7 +73,7 @@ def row(name: str) -> str:
 
 def table(names: list[str]) -> list[str]:
     made = correct(
-        observe(nominal_demonstration(), make_noise("isotropic", LEVEL), np.random.default_rng(0)), "contact"
+        observe(nominal_demonstration(), make_noise("isotropic", NOISE_LEVEL), np.random.default_rng(0)), "contact"
     )
     assert made.test is not None
     head = TABLE.format(trials=TRIALS, scenario=SCENARIO, level=100 * made.test.level)
@@ -86,7 +86,12 @@ def main() -> None:
     lines += [INTRODUCTION, *(f"- [{name}](#{name}): {title}" for name, title in models.items())]
     lines += table(list(models))
     for name in models:
-        lines += ["", f'<a id="{name}"></a>', "", write_card(name, LEVEL, draw_errors(name, LEVEL), 2).rstrip()]
+        lines += [
+            "",
+            f'<a id="{name}"></a>',
+            "",
+            write_card(name, NOISE_LEVEL, draw_errors(name, NOISE_LEVEL), 2).rstrip(),
+        ]
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -11,24 +11,24 @@ from top_picture import ARM, FITS, JAMS, draw_top, shot
 
 from apo_bench.assembly import Plan
 from apo_bench.correction.correctors import correct
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
+from apo_bench.trial.rollout import Rollout
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
-from apo_bench.trial.story import Story
 from apo_bench.viz.believed_picture import belief_panel, draw_beliefs
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 7
-LEVEL = 2.0
+NOISE_LEVEL = 2.0
 
 
 def main() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
     shown = simulate_demonstration(scene, 1.0, SEED)
-    seen = observe_demonstration(shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
+    seen = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
     corrected = correct(seen, "contact").goals
     with_ur5e = build_scene(scene.scenario, arm=ARM)
     shots = [
@@ -41,26 +41,26 @@ def main() -> None:
     draw_top(shots, HERE / "top.png")
     beliefs = [belief_panel("as seen", seen, seen.goals, 3), belief_panel("corrected by contact", seen, corrected, 3)]
     draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
-    for method in ("none", "contact"):
+    for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")
 
 
 def draw_film(method: str, path: Path) -> None:
     """One picture of the film of a replay: how it ended where it failed, else the stick on its way in."""
 
-    def keep(story: Story) -> None:
-        replayed = story.chapters[-1]
+    def keep(rollout: Rollout) -> None:
+        replayed = rollout.chapters[-1]
         inside = [m for m in replayed.moments if m.doing.operation == 2 and m.doing.macro.startswith("insert")]
-        shown = replayed.moments if method == "none" else inside[: 3 * len(inside) // 4]
+        shown = replayed.moments if method == "uncorrected" else inside[: 3 * len(inside) // 4]
         *_, ended = pictures = [
             picture
             for picture, _ in frames(
-                story.scene.scenario.assembly, story.assembled, [replace(replayed, moments=tuple(shown[-6:]))]
+                rollout.scene.scenario.assembly, rollout.assembled, [replace(replayed, moments=tuple(shown[-6:]))]
             )
         ]
-        imageio.imwrite(path, ended if method == "none" else pictures[0])
+        imageio.imwrite(path, ended if method == "uncorrected" else pictures[0])
 
-    run_request(Request("stick_in_tower", {"level": 1.0, "seed": SEED, "method": method}), keep)
+    run_request(Request("stick_in_tower", {"noise_level": 1.0, "seed": SEED, "method": method}), keep)
 
 
 if __name__ == "__main__":

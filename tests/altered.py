@@ -29,7 +29,7 @@ VALUES: tuple[Any, ...] = (
         {"": {}},
         [None],
         "y" * 300,
-        "recognised",
+        "detected",
         "shifted:3",
         "missed",
         "measured",

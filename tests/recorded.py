@@ -38,11 +38,11 @@ def motion(name: str) -> tuple[Array, Mapping[str, Array]]:
     return t, {part: np.array([frame[part] for frame in frames]) for part in now}
 
 
-def seen(name: str, level: float, seed: int = 0) -> dict[str, PoseTrack]:
+def seen(name: str, noise_level: float, seed: int = 0) -> dict[str, PoseTrack]:
     """The tracks of a camera with this noise of each frame, mm and degrees, camera from part."""
     t, T = motion(name)
     rng = np.random.default_rng(seed)
-    size = level * np.repeat([1e-3, np.radians(1.0)], 3)
+    size = noise_level * np.repeat([1e-3, np.radians(1.0)], 3)
     return {
         part: PoseTrack(t, pose.inverse(CAMERA) @ x @ pose.exp(size * rng.standard_normal((len(t), 6))))
         for part, x in T.items()

@@ -66,7 +66,7 @@ def scenario(
         grasps=tuple(grasps),
         site=Site((0.1, 0.0), (0.03, 0.03), (-0.3, 0.3)),
         shifts=(),
-        careless=None,
+        human_error=None,
         thresholds=Thresholds(),
         clearance_mm=0.25,
         gap_mm=0.1,

@@ -259,7 +259,7 @@ ALL = {
 }
 
 
-def careless(name: str, mm: float, low_mm: float = 0.0) -> tuple[Scene, Array]:
+def human_error(name: str, mm: float, low_mm: float = 0.0) -> tuple[Scene, Array]:
     """An example of Section 5 or Fig. 6 and what is seen of it: a part put aside, unnoticed, and mended at the end.
 
     Args:
@@ -285,11 +285,11 @@ def turned(scene: Scene, T_world: Array) -> Scene:
     return Scene(scene.assembly, start, T_world @ scene.goals)
 
 
-def shown(scene: Scene, careless: Array | None = None) -> Demonstration:
+def shown(scene: Scene, human_error_scale: Array | None = None) -> Demonstration:
     """A demonstration that shows the true goals."""
     n = len(scene.assembly)
     final = placements(scene.assembly, scene.start, scene.goals)[-1]
-    added = np.zeros((n, 6, 6)) if careless is None else careless
+    added = np.zeros((n, 6, 6)) if human_error_scale is None else human_error_scale
     return Demonstration(scene.assembly, scene.start, scene.goals, final, added)
 
 

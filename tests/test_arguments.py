@@ -34,8 +34,8 @@ WRONG: tuple[Any, ...] = (None, 2, 1.5, "x", [1.5], [object()], object())
 @pytest.fixture(scope="module")
 def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Any]:
     """Name of a parameter, or of a record -> what is right; every function that is given all of it ends quickly."""
-    settings = apo_bench.TrialSettings(SCENARIO, abstain=1.0)
-    simulated = simulate_demonstration(castles, settings.careless, settings.seed)
+    settings = apo_bench.TrialConfig(SCENARIO, min_predicted_success=1.0)
+    simulated = simulate_demonstration(castles, settings.human_error_scale, settings.seed)
     shown = simulated.demonstration
     assembly = shown.assembly
     observation = apo_bench.observe(shown, "isotropic", np.random.default_rng(0))
@@ -59,8 +59,10 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "ReplayResult": apo_bench.ReplayResult(reached, Outcome("done", "ok", None, "done"), 0.0, 0.0),
         "Scenario": castles.scenario,
         "Scene": castles,
-        "SweepSettings": apo_bench.SweepSettings((SCENARIO,), (1.0,), (1.0,), ("contact",), trials=1, abstains=(1.0,)),
-        "TrialSettings": settings,
+        "SweepConfig": apo_bench.SweepConfig(
+            (SCENARIO,), (1.0,), (1.0,), ("contact",), trials=1, min_predicted_success=(1.0,)
+        ),
+        "TrialConfig": settings,
         "Verdict": apo_bench.judge(assembly, reached, reference, castles.criteria),
     }
     by_record = {
@@ -75,8 +77,8 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "scenario": "Scenario",
         "scene": "Scene",
         "where": "Scene",
-        "grids": "SweepSettings",
-        "settings": "TrialSettings",
+        "grids": "SweepConfig",
+        "settings": "TrialConfig",
     }
     others = {
         "simulated": simulated,
@@ -158,7 +160,7 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
         with pytest.raises(apo_bench.InputError, match="seen of Observation must be an array of True"):
             dataclasses.replace(observation, seen=seen)
     start = {**observation.start, "stik": np.eye(4)}
-    shown = {"careless": observation.covariance, "final": {}}
+    shown = {"human_error_scale": observation.covariance, "final": {}}
     parts = {"assembly": observation.assembly, "goals": observation.goals}
     for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, parts)):
         with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'; did you mean 'stick'"):
@@ -191,11 +193,11 @@ def written(path: Path, text: str) -> Path:
 
 
 ONE_NAME: tuple[tuple[str, Callable[[Path], Any], Any], ...] = (
-    ("settings of a sweep", lambda at: apo_bench.SweepSettings(SCENARIO).scenarios, (SCENARIO,)),
-    ("methods", lambda at: apo_bench.SweepSettings(SCENARIO, methods="paper").methods, ("paper",)),
+    ("settings of a sweep", lambda at: apo_bench.SweepConfig(SCENARIO).scenario, (SCENARIO,)),
+    ("methods", lambda at: apo_bench.SweepConfig(SCENARIO, method="paper").method, ("paper",)),
     (
         "sweep file",
-        lambda at: read_sweep(written(at, f"scenarios = '{SCENARIO}'\nmethods = 'paper'"))[0].methods,
+        lambda at: read_sweep(written(at, f"scenario = '{SCENARIO}'\nmethod = 'paper'"))[0].method,
         ("paper",),
     ),
     (
@@ -240,14 +242,14 @@ def test_a_relation_that_is_left_out_may_be_one_text() -> None:
 def test_settings_of_a_trial_are_texts_and_plain_numbers() -> None:
     for wrong in ({"scenario": 3}, {"scenario": "dovetail", "noise": [1]}, {"scenario": "dovetail", "arm": [1]}):
         with pytest.raises(apo_bench.InputError, match=r"a name is needed, a str"):
-            apo_bench.TrialSettings(**wrong)
-    assert type(apo_bench.TrialSettings("dovetail", level_mm=np.float32(0.5)).level_mm) is float
-    assert apo_bench.SweepSettings("dovetail", trials=np.int64(2)).trials == 2
+            apo_bench.TrialConfig(**wrong)
+    assert type(apo_bench.TrialConfig("dovetail", noise_mm=np.float32(0.5)).noise_mm) is float
+    assert apo_bench.SweepConfig("dovetail", trials=np.int64(2)).trials == 2
 
 
 def test_a_scene_of_another_scenario_is_refused(tower: apo_bench.Scene) -> None:
     with pytest.raises(apo_bench.InputError, match="the scene is of 'stick_in_tower'; build the scene of the same"):
-        apo_bench.run_trial(apo_bench.TrialSettings("dovetail"), tower)
+        apo_bench.run_trial(apo_bench.TrialConfig("dovetail"), tower)
 
 
 def test_a_part_is_written_into_its_folder_only(tmp_path: Path) -> None:

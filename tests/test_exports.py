@@ -16,7 +16,7 @@ VERBS = ("demonstrate", "observe", "recognise", "correct", "replay", "judge", "r
 
 
 def test_the_verbs_and_their_records_are_exported() -> None:
-    records = {"Demonstration", "Observation", "Correction", "Plan", "ReplayResult", "Verdict", "TrialSettings"}
+    records = {"Demonstration", "Observation", "Correction", "Plan", "ReplayResult", "Verdict", "TrialConfig"}
     assert records.union(VERBS) <= set(apo_bench.__all__)
     assert set(apo_bench.__all__) <= set(dir(apo_bench))
     for name in VERBS:
@@ -43,9 +43,12 @@ def test_a_level_is_for_a_noise_model_that_is_named() -> None:
     from tests import scenes
 
     shown = scenes.shown(scenes.stick_in_tower())
-    seen = [apo_bench.observe(shown, "isotropic", np.random.default_rng(3), level=level) for level in (2.0, (2.0, 2.0))]
+    seen = [
+        apo_bench.observe(shown, "isotropic", np.random.default_rng(3), noise_level=noise_level)
+        for noise_level in (2.0, (2.0, 2.0))
+    ]
     assert seen[0].goals.tobytes() == seen[1].goals.tobytes()
     made = apo_bench.observe(shown, "isotropic", np.random.default_rng(3))
     assert np.abs(made.goals - shown.goals).max() < np.abs(seen[0].goals - shown.goals).max()
     with pytest.raises(apo_bench.InputError, match=r"the level 2\.0 was given together with a noise"):
-        apo_bench.observe(shown, lambda assembly, shown, rng: seen[0], np.random.default_rng(3), level=2.0)
+        apo_bench.observe(shown, lambda assembly, shown, rng: seen[0], np.random.default_rng(3), noise_level=2.0)

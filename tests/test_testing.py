@@ -10,7 +10,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.testing import assert_success_rate, sequential_test
 
-EASY = {"scenario": "block_on_block", "level_mm": 1.0, "level_deg": 1.0, "grasp": "weld"}
+EASY = {"scenario": "block_on_block", "noise_mm": 1.0, "noise_deg": 1.0, "grasp": "weld"}
 
 
 def rates(p: float, rng: np.random.Generator, n: int = 2000) -> tuple[float, float]:
@@ -74,9 +74,9 @@ def test_no_trial_decides_nothing() -> None:
     ("method", "cell", "said"),
     [
         (None, EASY, "give a name or a corrector"),
-        ("none", {}, "name one"),
-        ("none", EASY | {"bogus": 1}, "unknown setting 'bogus'"),
-        ("none", EASY | {"seed": 1}, "unknown setting 'seed'"),
+        ("uncorrected", {}, "name one"),
+        ("uncorrected", EASY | {"bogus": 1}, "unknown setting 'bogus'"),
+        ("uncorrected", EASY | {"seed": 1}, "unknown setting 'seed'"),
     ],
 )
 def test_wrong_requests_are_refused(method: object, cell: object, said: str) -> None:

@@ -45,7 +45,7 @@ from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residua
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
 from apo_bench.assembly.lowering import lowered, lowered_observation, lowered_together
 from apo_bench.assembly.pattern import Pattern, looking_away
-from apo_bench.assembly.reached import Felt, InHand, Outcome, Reached, ReplayResult, Snapshot
+from apo_bench.assembly.reached import InHand, Outcome, ProbingResult, Reached, ReplayResult, Snapshot
 from apo_bench.assembly.topology import (
     ODL,
     Assembly,
@@ -86,7 +86,6 @@ __all__ = (
     "Demonstration",
     "Equations",
     "Facing",
-    "Felt",
     "Gap",
     "GapKind",
     "Graph",
@@ -105,6 +104,7 @@ __all__ = (
     "Pattern",
     "Plan",
     "Poses",
+    "ProbingResult",
     "Reached",
     "Relation",
     "ReplayResult",

@@ -50,7 +50,7 @@ class Demonstration:
     """(n, 4, 4): pose of each operation's main part when the hand had let go of it and it rested."""
     final: Poses
     """Where every part lay at the end: small late adjustments show here and nowhere else."""
-    careless: Array
+    human_error_covariance: Array
     """(n, 6, 6) covariance [m, rad] that the human's carelessness adds, body frame of each main part."""
     code: str = "ok"
     """`ok`, or `demonstration_failed`."""
@@ -63,7 +63,7 @@ class Demonstration:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        freeze(self, goals=(n, 4, 4), careless=(n, 6, 6), start=(4, 4), final=(4, 4))
+        freeze(self, goals=(n, 4, 4), human_error_covariance=(n, 6, 6), start=(4, 4), final=(4, 4))
         _check_parts(self.assembly, self.start, self.final)
 
 
@@ -112,7 +112,7 @@ class Observation:
         object.__setattr__(self, "seen", seen)
 
     def plan(self) -> "Plan":
-        """What was seen, as it is: the plan of the method `none`.
+        """What was seen, as it is: the plan of the method `uncorrected`.
 
         Raises:
             InputError: An operation was not seen.

@@ -78,7 +78,7 @@ class InHand:
 
 @final
 @dataclass(frozen=True)
-class Felt:
+class ProbingResult:
     """What a robot has found out about itself by touching, and how sure it is."""
 
     touches: int
@@ -104,10 +104,10 @@ class ReplayResult:
     peak_force_n: float
     """Largest net contact force on a part that the robot held (the gripper's own forces excluded), behind a low-pass
     filter of 20 ms, [N]."""
-    sim_seconds: float
+    sim_time_s: float
     timeline: tuple[tuple[Step, float], ...] = ()
     """Each step that was finished, with the simulated time at which it was over, [s]."""
     in_hand: tuple[InHand, ...] = ()
     """Of each operation whose part was grasped; no controller reads it."""
-    felt: Felt | None = None
+    felt: ProbingResult | None = None
     """None of a robot that does not feel."""

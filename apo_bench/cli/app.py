@@ -100,7 +100,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "graph": graph_command,
     "explain": explain_command,
     "correct": correct_command,
-    "eye": eye_command,
+    "pose_source": eye_command,
     "plan": plan_command,
     "recognise": recognise_command,
     "scenarios": scenario.scenarios_command,

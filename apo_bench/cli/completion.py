@@ -5,7 +5,7 @@ Where none begins like what was typed, a shell offers files, as scenarios, noise
 
 from collections.abc import Callable
 
-from apo_bench.records import FOREIGN_ARMS, METHODS, RECOGNISED, SETTINGS, WRONG_RELATIONS
+from apo_bench.records import DETECTED, FOREIGN_ARMS, METHODS, SETTINGS, WRONG_CONTACTS
 from apo_bench.resources import folder
 
 Completion = Callable[[str], list[str]]
@@ -22,9 +22,9 @@ def offered_names(what: str) -> list[str]:
         return [*NOISES, *_stems("assets", "noise/*.toml")]
     if what == "arm":
         return [SETTINGS["arm"].default, *_stems("assets", "arms/*.toml"), *FOREIGN_ARMS]
-    if what == "relations":
-        return [SETTINGS["relations"].default, *RECOGNISED, *WRONG_RELATIONS]
-    return [*METHODS, "search"] if what == "method" else [*SETTINGS[what].choices]
+    if what == "contact_source":
+        return [SETTINGS["contact_source"].default, *DETECTED, *WRONG_CONTACTS]
+    return [*METHODS, "spiral-search"] if what == "method" else [*SETTINGS[what].choices]
 
 
 def completion(what: str) -> Completion:

@@ -45,7 +45,7 @@ def correct_command(
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.correction.correctors import correct
-    from apo_bench.trial.promise import promise_sentence
+    from apo_bench.trial.predicted_success import predicted_success_sentence
     from apo_bench.viz.correct_text import correction_form, correction_lines, correction_tables
 
     check_outputs([(out, "--out", (".json", ".csv"))], [observation])
@@ -69,12 +69,12 @@ def correct_command(
     form = correction_form(loaded.name, method, seen, correction, explanation, assumed)
     if as_json:
         moved = None if out is None or planned is None else planned.moved or None
-        print_json(form | {"moved": moved, "promised": planned and planned.promised})
+        print_json(form | {"moved": moved, "predicted_success": planned and planned.predicted_success})
     else:
         typer.echo(f"{loaded.name} from {observation}, corrected by {method}\n")
         lines = correction_lines(correction, explanation)
         if planned is not None:
-            lines.append(("promised", promise_sentence(planned.promised)))
+            lines.append(("predicted_success", predicted_success_sentence(planned.predicted_success)))
         if assumed:
             lines.append(("noise", assumed_deviations(deviation_mm, deviation_deg)))
         print_lines(lines)

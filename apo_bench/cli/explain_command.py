@@ -26,7 +26,7 @@ def explain_command(
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct
     from apo_bench.correction.explanation import explain
-    from apo_bench.trial.promise import promise_sentence
+    from apo_bench.trial.predicted_success import predicted_success_sentence
     from apo_bench.viz.explain_text import (
         explanation_form,
         hypothesis_forms,
@@ -38,7 +38,7 @@ def explain_command(
 
     check_outputs([(out, "--out", (".png",))])
     stated = f"seen with a standard deviation of {deviation_mm:g} mm and {deviation_deg:g} deg per axis"
-    promised = None
+    predicted_success = None
     if observation is None:
         loaded = load_scenario(scenario)
         seen = as_planned(loaded, deviation_mm, deviation_deg)
@@ -51,7 +51,7 @@ def explain_command(
         at = correct(seen)
         if not at.ok:
             raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {at.sentence}.")
-        promised = plan_correction(loaded, seen, at).promised
+        predicted_success = plan_correction(loaded, seen, at).predicted_success
         where = f"at the corrected goals of {observation}" + f", {stated} where it states none" * assumed
     explanation = explain(seen, at)
     if out is not None:
@@ -60,12 +60,12 @@ def explain_command(
         draw_explanation(loaded, seen, explanation, out)
     form = explanation_form(loaded.name, explanation)
     if as_json:
-        known = {"promised": promised, "hypotheses": hypothesis_forms(explanation.hypotheses)}
+        known = {"predicted_success": predicted_success, "hypotheses": hypothesis_forms(explanation.hypotheses)}
         print_json(form | known)
     else:
         lines = [f"{loaded.name}: {total(explanation)}", where]
-        if promised is not None:
-            lines.append(f"promised: {promise_sentence(promised)}")
+        if predicted_success is not None:
+            lines.append(f"promised: {predicted_success_sentence(predicted_success)}")
         lines += [f"may be {line}" for line in hypothesis_lines(explanation.hypotheses)]
         typer.echo("\n".join([*lines, "", *sentences(explanation)]))
         print_tables(part_table(form))

@@ -12,9 +12,9 @@ from apo_bench.cli.printing import console, print_json, say
 
 def eye_command(
     scenario: ScenarioArgument,
-    level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
+    noise_level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Which demonstration.")] = 0,
-    careless: Annotated[float, typer.Option(help="0 is a careful human, 1 the scenario's.")] = 1.0,
+    human_error_scale: Annotated[float, typer.Option(help="0 is a careful human, 1 the scenario's.")] = 1.0,
     view: Annotated[int, typer.Option(help="Which view of the range finder the picture shows, from 1.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Draw every stage of seeing into this file: .png.")] = None,
     as_json: AsJson = False,
@@ -24,8 +24,8 @@ def eye_command(
 
     check_outputs([(out, "--out", (".png",))])
     drawn_view = checked_view(view)
-    sensor_run = run_sensor(scenario, level, seed, careless)
-    form = sensor_form(sensor_run, level, seed, careless)
+    sensor_run = run_sensor(scenario, noise_level, seed, human_error_scale)
+    form = sensor_form(sensor_run, noise_level, seed, human_error_scale)
     if out is not None:
         from apo_bench.viz.sensor_picture import draw_sensor
 

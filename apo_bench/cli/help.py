@@ -11,7 +11,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Start": ("scenarios", "replay", "view", "show"),
         "One plan, looked into": ("graph", "explain", "plan", "scene"),
-        "Your own poses and cameras": ("correct", "recognise", "recording", "eye", "noise"),
+        "Your own poses and cameras": ("correct", "recognise", "recording", "pose_source", "noise"),
         "Your own tasks and arms": ("scenario", "part", "arm"),
         "Many trials": ("sweep", "report", "compare", "score", "leaderboard", "dataset"),
     }
@@ -19,11 +19,21 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Heading -> commands of `apo-bench`, in this order."""
 OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
-        "A robot that feels": ("--wrench", "--stated-error"),
-        "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
-        "What a method makes of it": (*("--method", "--methods", "--relations", "--looks", "--abstain"),),
-        "Which trials": ("--trials", "--seed", "--salt-file"),
+        "Task and robot": ("--human-error-scale", "--clearance-mm", "--arm", "--grasp", "--robot-error"),
+        "A robot that feels": ("--ft-sensor", "--assumed-robot-error"),
+        "What is seen": (
+            "--noise-level",
+            "--noise-level",
+            "--noise-mm",
+            "--noise-deg",
+            "--noise",
+            "--pose-source",
+            "--observation",
+        ),
+        "What a method makes of it": (
+            *("--method", "--method", "--contact-source", "--max-reobservations", "--min-predicted-success"),
+        ),
+        "Which trials": ("--trials", "--seed", "--secret-seed-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Where they run": ("--workers", "--backend", "--address"),
         "Files": ("--out", "--save-observation", "--video"),

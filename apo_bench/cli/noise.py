@@ -37,16 +37,16 @@ _Source = Annotated[str | None, typer.Option(help="What the noise file says it i
 @noise.command("card")
 def print_noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
-    level: Annotated[
+    noise_level: Annotated[
         float, typer.Option(help="Of the table: mm and degrees, standard deviation; of measured noise, a factor.")
     ] = 1.0,
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a table of its errors."""
-    from apo_bench.perception.observation.noise import Level
+    from apo_bench.perception.observation.noise import NoiseLevel
     from apo_bench.viz.noise_card import draw_errors, write_card
 
-    check("level_mm", level, called="level")
-    both = Level(level, level)
+    check("noise_mm", noise_level, called="noise_level")
+    both = NoiseLevel(noise_level, noise_level)
     typer.echo(write_card(name, both, draw_errors(name, both)), nl=False)
 
 

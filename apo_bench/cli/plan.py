@@ -73,14 +73,16 @@ def plan_command(
         require(robot is None, "--robot was given without --observation, which says where things are; give both.")
         loaded = load_scenario(scenario)
         notes = list[str]()
-        promised = None
+        predicted_success = None
         plan = Plan(loaded.assembly, loaded.start, loaded.goals)
         where = "at the nominal goals"
         axes = "directions and until in the frame of the assembly"
     else:
         method = CORRECTOR if method is None else method
         with redirect_output(as_json):
-            loaded, plan, promised, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
+            loaded, plan, predicted_success, notes = _planned(
+                scenario, observation, method, (deviation_mm, deviation_deg)
+            )
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
     if arm is not None:
@@ -95,13 +97,13 @@ def plan_command(
         more = {} if acts is None else {"acts": _acts_form(loaded, plan, robot_frames, acts, arm)}
         write_form(form | more, robot)
     if as_json:
-        print_json(plan_lines_form(lines, loaded, notes) | {"promised": promised})
+        print_json(plan_lines_form(lines, loaded, notes) | {"predicted_success": predicted_success})
         return
     typer.echo(f"{loaded.name} {where}; {axes}: mm and degrees\n")
-    if promised is not None:
-        from apo_bench.trial.promise import promise_sentence
+    if predicted_success is not None:
+        from apo_bench.trial.predicted_success import predicted_success_sentence
 
-        notes.insert(0, f"promised: {promise_sentence(promised)}")
+        notes.insert(0, f"promised: {predicted_success_sentence(predicted_success)}")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
     if robot is not None:
         typer.echo(f"\nWrote {robot}")
@@ -127,7 +129,7 @@ def _planned(
 ) -> tuple[Scenario, Plan, float, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, what it promises, and what is to be said."""
     from apo_bench.trial.planning import apply_method, plan_warning
-    from apo_bench.trial.promise import promised_success
+    from apo_bench.trial.predicted_success import predict_success
 
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]
@@ -140,10 +142,10 @@ def _planned(
     warning = plan_warning(loaded, result.plan, result.correction)
     notes = [assumed_deviations(*deviations)] if assumed and result.correction is not None else []
     moved = "" if result.fitting is None else result.fitting.sentence
-    promised = promised_success(result.plan, seen, result.correction, loaded)
+    predicted_success = predict_success(result.plan, seen, result.correction, loaded)
     notes += filter(None, (moved, warning))
-    return loaded, result.plan, promised, notes
+    return loaded, result.plan, predicted_success, notes
 
 
 def _by(method: str) -> str:
-    return {"none": "as seen", "by-heart": "by heart"}.get(method, f"corrected by {method}")
+    return {"uncorrected": "as seen", "nominal": "by heart"}.get(method, f"corrected by {method}")

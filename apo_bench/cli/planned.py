@@ -12,14 +12,14 @@ class PlannedCorrection(NamedTuple):
     plan: Plan
     moved: str
     """What of it is not as corrected, so that it fits; empty if nothing."""
-    promised: float
+    predicted_success: float
     """The probability of success, whichever arm carries it out."""
 
 
 def plan_correction(scenario: Scenario, observation: Observation, correction: Correction) -> PlannedCorrection:
     """Move a plan that would not fit; a simulator is asked only then."""
     from apo_bench.planning.prediction.failure import predict
-    from apo_bench.trial.promise import promised_success
+    from apo_bench.trial.predicted_success import predict_success
 
     plan = correction.plan(observation)
     moved = ""
@@ -29,4 +29,4 @@ def plan_correction(scenario: Scenario, observation: Observation, correction: Co
         fitting = fitting_plan(correction, observation, scenario)
         plan = fitting.plan
         moved = fitting.sentence
-    return PlannedCorrection(plan, moved, promised_success(plan, observation, correction, scenario))
+    return PlannedCorrection(plan, moved, predict_success(plan, observation, correction, scenario))

@@ -11,34 +11,34 @@ from apo_bench.cli.setting_options import takes, trial_options
 from apo_bench.errors import require_known
 from apo_bench.formats.deviations import assumed_deviations
 from apo_bench.io import redirect_output
-from apo_bench.records import RECOGNISED
+from apo_bench.records import DETECTED
 from apo_bench.scenario.file import load_scenario
 
 
-@takes(trial_options("level", "careless", "seed", "noise", "eye"))
+@takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
 def recognise_command(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
     deviation_mm: StatedMm = None,
     deviation_deg: StatedDeg = None,
-    relations: Annotated[
+    contact_source: Annotated[
         str,
         typer.Option(help="recognised or recognised-jointly."),
-    ] = "recognised",
+    ] = "detected",
     as_json: AsJson = False,
     **options: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
-    from apo_bench.trial.recognised_contacts import recognise_by
+    from apo_bench.trial.detected_contacts import recognise_by
     from apo_bench.trial.request import looked_at
     from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
 
-    require_known("way of recognising", relations, RECOGNISED)
+    require_known("way of recognising", contact_source, DETECTED)
     name = load_scenario(scenario).name
     with redirect_output(as_json):
         seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
-    form = recognition_form(name, relations, seen, recognise_by(seen, relations), assumed)
+    form = recognition_form(name, contact_source, seen, recognise_by(seen, contact_source), assumed)
     if as_json:
         print_json(form)
         return

@@ -34,7 +34,7 @@ def run_replay(
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
     from apo_bench.cli.trial_text import print_row
     from apo_bench.trial.request import Request, run_request
-    from apo_bench.trial.story import Story
+    from apo_bench.trial.rollout import Rollout
     from apo_bench.viz.viewing import choose_display
     from apo_bench.viz.viewing import view as show_story
 
@@ -49,11 +49,11 @@ def run_replay(
         save_observation=save_observation,
         video=video,
     )
-    stories = list[Story]()
+    rollouts = list[Rollout]()
     try:
         with redirect_output(as_json):
             if trial_limit is None:
-                row = run_request(request, stories.append if view else None)
+                row = run_request(request, rollouts.append if view else None)
             else:
                 from apo_bench.benchmark.sweeps.pool import run_request_alone
 
@@ -64,13 +64,13 @@ def run_replay(
         print_json(row)
     else:
         print_row(row)
-    replayed = row["sim_seconds"] is not None
+    replayed = row["sim_time_s"] is not None
     if video is not None and replayed:
         typer.echo(f"Wrote {video}", err=as_json)
     elif video is not None:
         typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
     if place is not None and replayed:
-        show_story(stories[0], place, port, partial(typer.echo, err=as_json))
+        show_story(rollouts[0], place, port, partial(typer.echo, err=as_json))
     elif place is not None:
         typer.echo("apo-bench: nothing was replayed, so there is nothing to view.", err=True)
     if row["success"] is None:

@@ -95,7 +95,7 @@ def scenario_new(
         f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.",
     )
     require(up is None or up in UPS, f"--up {up} was given; {', '.join(UPS)} are allowed.")
-    require(0.0 <= (clearance or 0.0) <= 5.0, f"--clearance {clearance} was given; 0 to 5 mm are allowed.")
+    require(0.0 <= (clearance or 0.0) <= 5.0, f"--clearance-mm {clearance} was given; 0 to 5 mm are allowed.")
     require(0.0 <= loosen <= 1.0, f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
     named = [*(assembly or parts or []), *(more or [])]
     source = ", ".join(Path(each).name for each in named) if assembly else "" if poses is None else poses.name
@@ -118,7 +118,7 @@ def scenario_new(
 def scenario_check(
     file: Annotated[Path, typer.Argument(help="A scenario file.", parser=path_given)],
     seeds: Annotated[int, typer.Option(help="Trials in which the robot knows the truth.")] = 5,
-    fidelity: Annotated[str, typer.Option(help="Of these trials: full, or contact.")] = "full",
+    fidelity: Annotated[str, typer.Option(help="Of these trials: full, or near-contact.")] = "full",
     arm: Annotated[str, typer.Option(help="By which arm, as in `arm check`; what would be in its reach is said.")] = (
         "six_axis"
     ),

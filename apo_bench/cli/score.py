@@ -65,7 +65,7 @@ def score_command(
     ] = None,
     name: Annotated[str | None, typer.Option(help="What tables call the entry; default: its method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A few seeds of each cell: whether it works.")] = False,
-    salt_file: Annotated[
+    secret_seed_file: Annotated[
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="Draw trials that nobody can draw without this file."),
     ] = None,
@@ -94,7 +94,7 @@ def score_command(
         "workers": cores() if workers is None and backend == "local" else workers,
         "backend": backend,
         "address": address,
-        "salt_file": salt_file,
+        "secret_seed_file": secret_seed_file,
     }
     if export is not None:
         check_writable(export, "--export", (".jsonl",))
@@ -139,7 +139,7 @@ def leaderboard_command(
         Path,
         typer.Option(parser=path_given, metavar="<path>", help="The page, .md; its figure lies beside it."),
     ],
-    salt: Annotated[
+    secret_seed: Annotated[
         list[str] | None,
         typer.Option(help="Hash of a salt that you drew trials with: entries of it are verified; may be said again."),
     ] = None,
@@ -149,7 +149,7 @@ def leaderboard_command(
 
     check_writable(out, "--out", (".md",))
     entries, left_out = read_entries(folder)
-    write_leaderboard(entries, out, frozenset(salt or ()))
+    write_leaderboard(entries, out, frozenset(secret_seed or ()))
     for sentence in left_out:
         typer.echo(f"left out: {brief(clean(sentence))}", err=True)
     typer.echo(f"{len(entries)} entries in {out}")
@@ -163,7 +163,7 @@ def report_command(
         Path, typer.Argument(parser=path_given, metavar="FOLDER", help="The folder that `sweep --out` wrote.")
     ],
     pictures: Annotated[int, typer.Option(help="Failures that are drawn at most; each is run again for it.")] = 6,
-    salt_file: Annotated[
+    secret_seed_file: Annotated[
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run its failures again."),
     ] = None,
@@ -180,7 +180,7 @@ def report_command(
         0 <= pictures <= _MOST_PICTURES,
         f"--pictures {pictures} was given; a whole number from 0 to {_MOST_PICTURES} is allowed.",
     )
-    written = report(folder, pictures, salt_file, trust_code=trust_code, draw=failure_pictures)
+    written = report(folder, pictures, secret_seed_file, trust_code=trust_code, draw=failure_pictures)
     print_cells(written.cells)
     print_report(written)
 

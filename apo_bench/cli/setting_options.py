@@ -9,7 +9,7 @@ import typer
 
 from apo_bench.cli.completion import completion
 from apo_bench.cli.values import numbers, path_given, whole_numbers, words
-from apo_bench.records import LEVEL, SETTINGS, SettingInfo
+from apo_bench.records import NOISE_LEVEL, SETTINGS, SettingInfo
 from apo_bench.records.run.replay_command import milli, number
 
 Command = TypeVar("Command", bound=Callable[..., None])
@@ -30,30 +30,23 @@ def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
 
 def trial_options(*names: str) -> list[Parameter]:
     """Options of one trial, none of which need be given: those of these settings, or of all."""
-    infos = {LEVEL.name: LEVEL, **SETTINGS}
+    infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
     return [_of_trial(info) for name, info in infos.items() if info.help and (not names or name in names)]
 
 
 def sweep_options() -> list[Parameter]:
     """Options of a sweep: its axes, and what all of its trials have in common."""
-    axes = {info.axis: info for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help}
-    return [*map(_axis, axes.values()), *map(_of_trial, [info for info in SETTINGS.values() if info.shared])]
-
-
-def axis_option(info: SettingInfo) -> str:
-    """What the option of an axis is called, as an argument."""
-    return (info.axis_option or info.option).replace("-", "_")
-
-
-def axis_flag(info: SettingInfo) -> str:
-    """The option of an axis as it is typed: `--robot-error`."""
-    return f"--{axis_option(info).replace('_', '-')}"
+    axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
+    return [
+        *map(_axis, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
+        *map(_of_trial, [info for info in SETTINGS.values() if info.shared]),
+    ]
 
 
 def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
     """What was given for an axis: `0,0.5,1` or `none,contact`."""
     read = words if info.is_text else whole_numbers if info.is_whole else numbers
-    return read(text, axis_flag(info))
+    return read(text, f"--{info.option}")
 
 
 def shown_default(info: SettingInfo) -> str:
@@ -63,7 +56,7 @@ def shown_default(info: SettingInfo) -> str:
 
 def _of_trial(info: SettingInfo) -> Parameter:
     described = f"{info.help}; default: {shown_default(info)}."
-    if info.name == "salt":
+    if info.name == "secret_seed":
         return _option(info.keyword, Path, described, parser=path_given, metavar="<path>")
     kind = getattr(info.kind, "__origin__", info.kind)
     return _option(info.keyword, kind, described, autocompletion=_completion_of(info))
@@ -72,12 +65,12 @@ def _of_trial(info: SettingInfo) -> Parameter:
 def _axis(info: SettingInfo) -> Parameter:
     usual = ",".join(_in_option_unit(info, value) for value in info.swept) or shown_default(info)
     described = f"{info.help}; several with commas; default: {usual}."
-    return _option(axis_option(info), str, described, autocompletion=_completion_of(info))
+    return _option(info.keyword, str, described, autocompletion=_completion_of(info))
 
 
 def _completion_of(info: SettingInfo) -> Callable[[str], list[str]] | None:
     """How the value of a setting is completed; None where it is a number."""
-    named = info.choices or info.name in ("noise", "arm", "relations", "method")
+    named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
     return completion(info.name) if named else None
 
 

@@ -17,7 +17,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
 
-@takes(trial_options("level", "careless", "seed", "noise", "eye"))
+@takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
 def show_command(
     scenario: ScenarioArgument,
     *,

@@ -21,14 +21,14 @@ from apo_bench.cli.completion import completion
 from apo_bench.cli.cores import cores
 from apo_bench.cli.help import group
 from apo_bench.cli.outputs import writing
-from apo_bench.cli.setting_options import axis_flag, axis_option, read_axis, sweep_options, takes, trial_options
+from apo_bench.cli.setting_options import read_axis, sweep_options, takes, trial_options
 from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
-from apo_bench.records import FIRST_TRAINING_TRIAL, in_python
+from apo_bench.records import FIRST_TRAINING_TRIAL, SETTINGS, in_python
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
-    from apo_bench.benchmark.sweeps.grid import SweepSettings
+    from apo_bench.benchmark.sweeps.grid import SweepConfig
 
 _KILLED = 128
 """Added to the number of a signal: the exit code of a process that it has ended."""
@@ -69,7 +69,7 @@ def sweep_command(
         int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
-    salt_file: Annotated[
+    secret_seed_file: Annotated[
         Path | None,
         typer.Option(
             parser=path_given,
@@ -103,7 +103,7 @@ def sweep_command(
             backend=backend,
             address=address,
             command=command,
-            salt_file=salt_file,
+            secret_seed_file=secret_seed_file,
         )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error
@@ -114,18 +114,18 @@ def sweep_command(
     )
 
 
-def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
+def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepConfig, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
-    from apo_bench.benchmark.sweeps.grid import AXES, SweepSettings
+    from apo_bench.benchmark.sweeps.grid import AXES, SweepConfig
     from apo_bench.benchmark.sweeps.sweep_file import is_sweep_file, read_sweep
 
-    axes = {axis_option(info): info for info in AXES}
+    axes = {info.keyword: info for info in (*AXES, SETTINGS["noise_mm"], SETTINGS["noise_deg"])}
     texts = {axes[option]: text for option, text in options.items() if option in axes}
     others = {name: value for name, value in options.items() if name not in axes}
     files = [name for name in scenarios if is_sweep_file(name)]
     if not files:
-        several: dict[str, Any] = {info.axis: read_axis(info, text) for info, text in texts.items()}
-        return (SweepSettings(tuple(scenarios), **several, **in_python(others)),)
+        several: dict[str, Any] = {info.name: read_axis(info, text) for info, text in texts.items()}
+        return (SweepConfig(tuple(scenarios), **several, **in_python(others)),)
     if len(scenarios) > 1:
         raise InputError(
             f"the sweep file {files[0]} was given together with {len(scenarios) - 1} more; name scenarios in the file, "
@@ -133,7 +133,7 @@ def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSetti
         )
     for info in texts:
         raise InputError(
-            f"{axis_flag(info)} was given together with the sweep file {files[0]}; write {info.axis} into the file."
+            f"--{info.option} was given together with the sweep file {files[0]}; write {info.name} into the file."
         )
     return read_sweep(files[0], others)
 
@@ -146,7 +146,7 @@ dataset = group(
 
 
 @dataset.command("make")
-@takes(trial_options("level", "careless", "noise", "method", "clearance_mm", "robot_error", "arm"))
+@takes(trial_options("noise_level", "human_error_scale", "noise", "method", "clearance_mm", "robot_error", "arm"))
 def dataset_make(
     scenario: ScenarioArgument,
     more: Annotated[list[str] | None, typer.Argument(help="More scenarios.")] = None,

@@ -14,7 +14,7 @@ from apo_bench.benchmark.report.tables.table import Column
 from apo_bench.benchmark.report.tables.table import Table as Data
 from apo_bench.cli.printing import console
 from apo_bench.io import clean, has_parquet
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -83,6 +83,6 @@ def print_comparison(comparison: Comparison) -> None:
     console().print(differ if names else "Made with the same.")
 
 
-def print_prediction(rows: Iterable[Row]) -> None:
+def print_prediction(rows: Iterable[TrialRecord]) -> None:
     """In one line, how often plans predicted what happened."""
     console().print(prediction_summary(confusions(rows)[-1]))

@@ -4,13 +4,22 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
-from apo_bench.benchmark.analysis import level_label
+from apo_bench.benchmark.analysis import noise_label
 from apo_bench.cli.printing import console
 from apo_bench.io import clean
-from apo_bench.records import SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
-from apo_bench.trial.promise import promise_sentence
+from apo_bench.records import SETTINGS, FreedSet, MovedInHand, Predicted, TrialRecord, look_up, probes
+from apo_bench.trial.predicted_success import predicted_success_sentence
 
-_SAID = ("eye", "noise", "relations", "looks", "robot_error", "abstain", "wrench", "stated_error")
+_SAID = (
+    "pose_source",
+    "noise",
+    "contact_source",
+    "max_reobservations",
+    "robot_error",
+    "min_predicted_success",
+    "ft_sensor",
+    "assumed_robot_error",
+)
 """Settings that are said if they are not as usual; the last two only of robots that feel."""
 
 _MEASURED = (
@@ -27,7 +36,7 @@ _MEASURED = (
         "planned error",
         "{planned_error_fixed_mm:.3f} mm fixed by contacts, {planned_error_free_mm:.3f} mm free",
     ),
-    ("sim_seconds", "peak force", "{peak_force_n:.1f} N in {sim_seconds:.1f} simulated seconds"),
+    ("sim_time_s", "peak force", "{peak_force_n:.1f} N in {sim_seconds:.1f} simulated seconds"),
     (
         "touches",
         "felt",
@@ -38,7 +47,7 @@ _MEASURED = (
 """Column -> name and text of a line, if the column has a value."""
 
 
-def print_row(row: Row) -> None:
+def print_row(row: TrialRecord) -> None:
     """Print a line for everything that is known of a trial."""
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, text in _lines(row):
@@ -46,42 +55,42 @@ def print_row(row: Row) -> None:
     console().print(table)
 
 
-def _lines(row: Row) -> Iterator[tuple[str, str]]:
+def _lines(row: TrialRecord) -> Iterator[tuple[str, str]]:
     yield "scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"
-    yield "trial", "measured observation" if row["level"] is None else ", ".join(_settings(row))
+    yield "trial", "measured observation" if row["noise_mm"] is None else ", ".join(_settings(row))
     yield "method", row["method"]
     yield "result", _result(row)
     yield "ended", row["sentence"] or ""
-    for attempt in row["tried"] or ():
+    for attempt in row["tried_corrections"] or ():
         yield f"after step {attempt['step']}", _attempt(attempt)
-    if row["freed"]:
-        yield "freed", _braced(row["freed"])
+    if row["corrected_operations"]:
+        yield "corrected operations", _braced(row["corrected_operations"])
     if row["extra_operations"]:
         yield "schedule", f"{row['extra_operations']} operations beyond doing each once"
-    if row["free_moved"]:
-        moved = ", ".join(f"operation {move['operation']} by {move['mm']:.1f} mm" for move in row["free_moved"])
+    if row["fit_adjustments"]:
+        moved = ", ".join(f"operation {move['operation']} by {move['mm']:.1f} mm" for move in row["fit_adjustments"])
         yield "free directions", f"{moved}, so that the plan fits"
-    if row["predicted"] is not None:
-        yield "predicted", _predicted(row["predicted"])
-    if (promised := row.get("promised")) is not None:
-        yield "promised", promise_sentence(promised)
+    if row["failure_prediction"] is not None:
+        yield "failure prediction", _predicted(row["failure_prediction"])
+    if (predicted_success := row.get("predicted_success")) is not None:
+        yield "predicted success", predicted_success_sentence(predicted_success)
     if row["loose_success"] is False and row["worst_gap_mm"] is not None:
         yield "contacts", "not every contact was made, even loosely"
     if row["p_value"] is not None:
-        yield "test", _test(row)
+        yield "consistency test", _test(row)
     for column, name, template in _MEASURED:
         if row.get(column) is not None:
             yield name, template.format_map(row)
-    if row["moved_in_hand"]:
-        yield "in the hand", _in_hand(row["moved_in_hand"], row["failure_operation"])
+    if row["grasp_slip"]:
+        yield "grasp slip", _in_hand(row["grasp_slip"], row["failure_operation"])
 
 
-def _settings(row: Row) -> Iterator[str]:
-    """`level 2`, `careless 1`, `seed 5`, then what is not as usual."""
-    yield f"level {level_label(row['level'] or 0.0, row['level_deg'] or 0.0, row['noise'])}"
-    yield f"careless {row['careless']:g}"
+def _settings(row: TrialRecord) -> Iterator[str]:
+    """`noise level 2`, `human error scale 1`, `seed 5`, then settings that are not the default."""
+    yield f"noise level {noise_label(row['noise_mm'] or 0.0, row['noise_deg'] or 0.0, row['noise'])}"
+    yield f"human error scale {row['human_error_scale']:g}"
     yield f"seed {row['seed']}"
-    for name in _SAID if feels(row["method"]) else _SAID[:-2]:
+    for name in _SAID if probes(row["method"]) else _SAID[:-2]:
         value = look_up(row, name) or SETTINGS[name].default
         if value != SETTINGS[name].default:
             yield f"{name.replace('_', ' ')} {value}"
@@ -111,11 +120,11 @@ def _predicted(outcome: Predicted) -> str:
     return f"operation {outcome['operation']} fails: {outcome['code']}{size}"
 
 
-def _test(row: Row) -> str:
+def _test(row: TrialRecord) -> str:
     """`chi-square 31.2 of 13, p 0.003: not explained by the stated noise; one of R2, R4 may be wrong; left out: R2`."""
     explained = f"{'' if row['test_passes'] else 'not '}explained by the stated noise"
     p = f"p {row['p_value']:.2g}" if row["p_value"] else "p < 1e-300"
-    parts = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, {p}: {explained}"]
+    parts = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_dof']}, {p}: {explained}"]
     if row["suspects"]:
         parts.append(f"{'one of ' * (len(row['suspects']) > 1)}{', '.join(row['suspects'])} may be wrong")
     if row["dropped"]:
@@ -123,7 +132,7 @@ def _test(row: Row) -> str:
     return "; ".join(parts)
 
 
-def _result(row: Row) -> str:
+def _result(row: TrialRecord) -> str:
     if row["success"] is None:
         return "none: the demonstration failed"
     if row["success"]:

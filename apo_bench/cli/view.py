@@ -20,7 +20,7 @@ def view_command(
         typer.Option(help="Of a folder: the line of trials.jsonl; default: the first failure."),
     ] = None,
     port: Port = None,
-    salt_file: Annotated[
+    secret_seed_file: Annotated[
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run it again."),
     ] = None,
@@ -28,21 +28,21 @@ def view_command(
     """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
     from apo_bench.cli.trial_text import print_row
     from apo_bench.simulation.scene.scene import build_scene
-    from apo_bench.trial.story import scenario_story
+    from apo_bench.trial.rollout import scenario_story
     from apo_bench.viz.finished_trial import trial_again
     from apo_bench.viz.viewing import choose_display, view
 
     folder = Path(target)
     if folder.is_dir():
         place = choose_display(port)
-        row, story = trial_again(folder, trial, salt_file)
+        row, rollout = trial_again(folder, trial, secret_seed_file)
         print_row(row)
     else:
-        for value, option in ((trial, "--trial"), (salt_file, "--salt-file")):
+        for value, option in ((trial, "--trial"), (secret_seed_file, "--secret-seed-file")):
             require(
                 value is None, f"{option}, which is for the folder of a sweep, was given for {target}; leave it out."
             )
         scenario = load_scenario(target)
         place = choose_display(port)
-        story = scenario_story(build_scene(scenario))
-    view(story, place, port, typer.echo)
+        rollout = scenario_story(build_scene(scenario))
+    view(rollout, place, port, typer.echo)

@@ -43,11 +43,11 @@ class APOAssemble(APOInsert):
     """
 
     def __init__(self, **settings: Any) -> None:
-        given = [name for name in ("operation", "feels") if name in settings]
+        given = [name for name in ("operation", "probing") if name in settings]
         require(
             not given, f"{' and '.join(given)} was given; all operations are done here, and nothing is felt before."
         )
-        super().__init__(operation=1, feels=False, **settings)
+        super().__init__(operation=1, probing=False, **settings)
         n = len(self.scene.scenario.assembly)
         self.share /= n
         seen = {**self.observation_space.spaces, "operation": spaces.Box(0.0, 1.0, (n,), np.float32)}  # type: ignore[attr-defined]

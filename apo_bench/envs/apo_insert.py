@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
 from apo_bench.envs.episode import asked_options
-from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
+from apo_bench.envs.spaces import PIXELS, insert_space, is_uncorrected
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, shown, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import (
     CORRECTOR,
     CORRECTORS,
@@ -26,9 +26,9 @@ from apo_bench.records import (
     FIRST_TRAINING_TRIAL,
     SIMULATED,
     USUAL,
-    TrialSettings,
+    TrialConfig,
     check,
-    level_pair,
+    noise_pair,
     sentence,
 )
 from apo_bench.scenario import Scenario, load_scenario
@@ -47,7 +47,7 @@ MOST_TRIES = 100
 """So many trials in a row may never come to the operation before `reset()` gives up."""
 _REWARDS = ("judge", "progress")
 _STARTS = ("training", "evaluation")
-_PLANS = ("none", "oracle", "by-heart")
+_PLANS = ("uncorrected", "oracle", "nominal")
 
 
 @check_arguments
@@ -65,7 +65,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     - `agent_pos`, `Box(13)`: where the front of the part is less where it is believed to end (3), the turn (3), by the
       encoders; what is commanded less that (3, 3); the opening of each finger less half the width of the part.
-    - `wrench`, `Box(6)`: force and torque on the hand and what is in it, about the flange, by the sensor of robots that
+    - `ft_sensor`, `Box(6)`: force and torque on the hand and what is in it, about the flange, by the sensor of robots that
       feel, with its noise, its offset that was zeroed, and its low pass.
     - `plan`, `Box(19)`: the way in, in the world (3); what is left of it and the least that was left so far; time left,
       [s]; standard deviations that are stated of the front and its turn (6); the last action (7).
@@ -96,10 +96,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     `success` and `is_success`, `code` and `sentence`. Nothing is truncated, as the time that is left is seen.
 
     ## Arguments
-    - `scenario`, `level`, `careless`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as of `APOReplay-v0`.
+    - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as of `APOReplay-v0`.
     - `operation`: counted from 1; None: the last one.
-    - `corrector`: what the plan is made by: a corrector, or `none`, `oracle`, `by-heart`.
-    - `robot_error`, `feels`, `wrench`, `stated_error`: as of `APOReplay-v0`. A robot that feels does all that it
+    - `corrector`: what the plan is made by: a corrector, or `none`, `oracle`, `nominal`.
+    - `robot_error`, `feels`, `ft_sensor`, `assumed_robot_error`: as of `APOReplay-v0`. A robot that feels does all that it
       does before the approach.
     - `residual`: whether actions are added to the approach; False: they are all that moves the tip.
     - `shift_mm`, `turn_deg`: of an action of 1.
@@ -123,18 +123,18 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self,
         scenario: str | Path | Scenario = "stick_in_tower",
         operation: int | None = None,
-        level: float | Sequence[float] = 1.0,
-        careless: float = TrialSettings.careless,
+        noise_level: float | Sequence[float] = 1.0,
+        human_error_scale: float = TrialConfig.human_error_scale,
         noise: str | Callable[..., Any] | None = None,
         corrector: Any = CORRECTOR,
-        grasp: str = TrialSettings.grasp,
+        grasp: str = TrialConfig.grasp,
         clearance_mm: float | None = None,
-        arm: str | Arm = TrialSettings.arm,
-        timestep_s: float = TrialSettings.timestep_s,
+        arm: str | Arm = TrialConfig.arm,
+        timestep_s: float = TrialConfig.timestep_s,
         robot_error: str = ROBOT_ERROR,
-        feels: bool = False,
-        wrench: str = TrialSettings.wrench,
-        stated_error: str = TrialSettings.stated_error,
+        probing: bool = False,
+        ft_sensor: str = TrialConfig.ft_sensor,
+        assumed_robot_error: str = TrialConfig.assumed_robot_error,
         residual: bool = True,
         shift_mm: float = 1.0,
         turn_deg: float = 0.5,
@@ -160,7 +160,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         for name, count in (("horizon", horizon), ("layouts", layouts)):
             require(count > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         check("seed", first_trial)
-        check("careless", careless)
+        check("human_error_scale", human_error_scale)
         self.render_mode = render_mode
         require(
             not isinstance(corrector, str) or "+" not in corrector,
@@ -175,10 +175,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._trials = Trials(
             build_scene(loaded, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s),
             int(k) - 1,
-            careless,
-            make_noise(USUAL if noise is None else noise, Level(*level_pair(level, "noise"))),
+            human_error_scale,
+            make_noise(USUAL if noise is None else noise, NoiseLevel(*noise_pair(noise_level, "noise"))),
             planner,
-            RobotSettings(robot_error, feels, wrench, stated_error).checked(),
+            RobotSettings(robot_error, probing, ft_sensor, assumed_robot_error).checked(),
         )
         self._residual = bool(residual)
         self.scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
@@ -383,7 +383,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     def _seen(self) -> Seen:
         actions = self._actions
-        seen = as_seen(
+        seen = is_uncorrected(
             self._at_work(),
             self._now().covariance,
             self._best,

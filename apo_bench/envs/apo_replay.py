@@ -16,30 +16,30 @@ from apo_bench.envs.starts import RobotSettings, carried_out
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.looking import Looks
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import (
-    RANGE,
+    DEPTH_CAMERA,
     USUAL,
     Predicted,
-    TrialSettings,
+    TrialConfig,
     check,
-    check_squares,
+    check_grip,
     check_together,
-    level_pair,
+    noise_pair,
     refuse_noise,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_scene, data_with_arm
 from apo_bench.trial.fitting import fitting_plan
-from apo_bench.trial.promise import abstained, promised_success
+from apo_bench.trial.predicted_success import abstained, predict_success
 from apo_bench.trial.stages import (
     demonstration_failure,
-    looks_at,
     observation_failure,
     observe_demonstration,
     predicted_outcome,
     range_sensor,
+    reobservations_of,
     trial_outcome,
 )
 
@@ -77,14 +77,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     `env.unwrapped.trial` and never in `info`: whoever sees it can draw the truth. The parts stand where the
     demonstration began.
 
-    `reset(options={...})` takes `level`, `careless` and `clearance_mm`, with the meaning of the arguments below and for
+    `reset(options={...})` takes `noise_level`, `human_error_scale` and `clearance_mm`, with the meaning of the arguments below and for
     that episode alone; any other key is refused, but for `lerobot_new_rollout`, which means nothing here.
 
     ## Episode End
     Every step terminates. `info` then holds `is_success` and, the same, `success`; `as_demonstrated` (each contact was
     also made when and where it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of
     `apo_bench.records.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
-    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`, and `promised`, the
+    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`, and `predicted_success`, the
     probability of success that it stated. Never the truth, and nothing from which it can be drawn.
     A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
     further step: code `time_limit`. Wall time has no limit.
@@ -93,23 +93,23 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     ## Arguments
     - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
-    - `level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
-    - `careless`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
+    - `noise_level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
+    - `human_error_scale`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
     - `noise`: a noise model by name, as `module:name`, or the object; None stands for `isotropic`.
-    - `eye`: `noise`, or `range`: poses are measured in depth images; `level` is then the noise of a ray in mm, and
+    - `pose_source`: `noise`, or `range`: poses are measured in depth images; `noise_level` is then the noise of a ray in mm, and
       there is no noise model.
     - `grasp`: `friction`, or `weld` for an ideal gripper.
     - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
     - `arm`: by name, or an `Arm`.
     - `timestep_s`: of the physics.
     - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
-    - `feels`: whether the robot finds out by touching how wrong it is itself, as with the methods `METHOD+feel`.
-    - `wrench`: the force and torque sensor at its wrist, `external` or another name or noise, if it feels.
-    - `stated_error`: how wrong it is said to be, `drawn`, `unstated`, or standard deviations, if it feels.
-    - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
-    - `abstain`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
+    - `feels`: whether the robot finds out by touching how wrong it is itself, as with the methods `METHOD+probe`.
+    - `ft_sensor`: the force and torque sensor at its wrist, `external` or another name or noise, if it feels.
+    - `assumed_robot_error`: how wrong it is said to be, `drawn`, `unstated`, or standard deviations, if it feels.
+    - `max_reobservations`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
+    - `min_predicted_success`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
       `promise`, code `abstained`. 0 carries out everything.
-    - `fidelity`: `full`, or `contact`, which simulates only where parts may touch: a third of the time.
+    - `fidelity`: `full`, or `near-contact`, which simulates only where parts may touch: a third of the time.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
       display; `rgb_array_list` the pictures of the whole replay; `human` opens a window when the replay begins.
 
@@ -126,44 +126,46 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     def __init__(
         self,
         scenario: str | Path | Scenario = "stick_in_tower",
-        level: float | Sequence[float] = 1.0,
-        careless: float = TrialSettings.careless,
+        noise_level: float | Sequence[float] = 1.0,
+        human_error_scale: float = TrialConfig.human_error_scale,
         noise: str | Callable[..., Any] | None = None,
-        grasp: str = TrialSettings.grasp,
+        grasp: str = TrialConfig.grasp,
         clearance_mm: float | None = None,
-        arm: str | Arm = TrialSettings.arm,
-        timestep_s: float = TrialSettings.timestep_s,
-        eye: str = TrialSettings.eye,
-        looks: int = TrialSettings.looks,
-        robot_error: str = TrialSettings.robot_error,
-        feels: bool = False,
-        wrench: str = TrialSettings.wrench,
-        stated_error: str = TrialSettings.stated_error,
-        abstain: float = TrialSettings.abstain,
-        fidelity: str = TrialSettings.fidelity,
+        arm: str | Arm = TrialConfig.arm,
+        timestep_s: float = TrialConfig.timestep_s,
+        pose_source: str = TrialConfig.pose_source,
+        max_reobservations: int = TrialConfig.max_reobservations,
+        robot_error: str = TrialConfig.robot_error,
+        probing: bool = False,
+        ft_sensor: str = TrialConfig.ft_sensor,
+        assumed_robot_error: str = TrialConfig.assumed_robot_error,
+        min_predicted_success: float = TrialConfig.min_predicted_success,
+        fidelity: str = TrialConfig.fidelity,
         render_mode: str | None = None,
     ) -> None:
         require(
             render_mode in (None, *self.metadata["render_modes"]),
             f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None.",
         )
-        check("eye", eye)
-        check("looks", looks)
-        check("abstain", abstain)
+        check("pose_source", pose_source)
+        check("max_reobservations", max_reobservations)
+        check("min_predicted_success", min_predicted_success)
         check("fidelity", fidelity)
         check_together(fidelity, grasp)
-        self._abstain = abstain
+        self._abstain = min_predicted_success
         self._fidelity = fidelity
-        self._robot = RobotSettings(robot_error, feels, wrench, stated_error).checked()
-        check_squares(self._robot.feels, grasp)
+        self._robot = RobotSettings(robot_error, probing, ft_sensor, assumed_robot_error).checked()
+        check_grip(self._robot.probing, grasp)
         self.render_mode = render_mode
-        if eye == RANGE and noise is not None:
+        if pose_source == DEPTH_CAMERA and noise is not None:
             refuse_noise(noise)
-        self._eye = eye
+        self._eye = pose_source
         self._model = USUAL if noise is None else noise
-        self._allowed = looks
-        self._usual = self._now = Settings(Level(*level_pair(level, eye)), careless, clearance_mm)
-        self._noise = self._usual_noise = make_noise(self._model, self._usual.level)
+        self._allowed = max_reobservations
+        self._usual = self._now = Settings(
+            NoiseLevel(*noise_pair(noise_level, pose_source)), human_error_scale, clearance_mm
+        )
+        self._noise = self._usual_noise = make_noise(self._model, self._usual.noise_level)
         self._scene = build_scene(
             load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
         )
@@ -193,7 +195,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     @property
     def look(self) -> Looks | None:
-        """Sees operations of this episode again, as often as `looks` says; None if it says 0.
+        """Sees operations of this episode again, as often as `max_reobservations` says; None if it says 0.
 
         Raises:
             ResetNeeded: There is no episode yet.
@@ -220,7 +222,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """Watch another demonstration; `seed=k` is trial k.
 
         Args:
-            options: `level`, `careless` and `clearance_mm` of this episode; what is not said is as the environment was
+            options: `noise_level`, `human_error_scale` and `clearance_mm` of this episode; what is not said is as the environment was
                 made.
 
         Raises:
@@ -231,10 +233,12 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
-        trial, simulated = watch_human(self._scene, self._now.careless, self._eye, seed, self.np_random)
-        noise = range_sensor(self._scene, simulated, self._now.level.mm) if self._eye == RANGE else self._noise
+        trial, simulated = watch_human(self._scene, self._now.human_error_scale, self._eye, seed, self.np_random)
+        noise = (
+            range_sensor(self._scene, simulated, self._now.noise_level.mm) if self._eye == DEPTH_CAMERA else self._noise
+        )
         seen = observe_demonstration(simulated, noise, trial)
-        look = looks_at(simulated, noise, trial, self._allowed) if self._allowed else None
+        look = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
         self._episode = Episode(trial, replace(simulated, images=None), seen, look)
         self.aim(seen.goals)
         self._refused = observation_failure(seen)
@@ -254,8 +258,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
         plan = moved(self._aim, action, self.action_space)
         self._over = True
-        said, end, predicted, promised = self._replayed(plan)
-        info = step_info(said, end, predicted, promised)
+        said, end, predicted, predicted_success = self._replayed(plan)
+        info = step_info(said, end, predicted, predicted_success)
         return as_seen_entries(self.seen), float(said["is_success"]), True, False, info
 
     def aim(
@@ -306,7 +310,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _set(self, now: Settings) -> None:
         """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
-        noise = self._usual_noise if now.level == self._usual.level else make_noise(self._model, now.level)
+        noise = (
+            self._usual_noise
+            if now.noise_level == self._usual.noise_level
+            else make_noise(self._model, now.noise_level)
+        )
         self._scene = self._scenes.of(now.clearance_mm)
         self._now = now
         self._noise = noise
@@ -321,13 +329,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._refused is not None:
             return failed, self._refused, None, None
         robot = self._robot
-        predicted = predicted_outcome(plan, self._scene, robot.feels)
-        told = robot.robot_error, robot.feels, robot.feels
-        promised = promised_success(plan, self.seen, self._correction, self._scene, *told)
-        if promised < self._abstain:
-            return failed, abstained(promised, self._abstain), predicted, promised
+        predicted = predicted_outcome(plan, self._scene, robot.probing)
+        told = robot.robot_error, robot.probing, robot.probing
+        predicted_success = predict_success(plan, self.seen, self._correction, self._scene, *told)
+        if predicted_success < self._abstain:
+            return failed, abstained(predicted_success, self._abstain), predicted, predicted_success
         watch = self._rendering.watch(self._scene, self.render_mode)
         attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
             self._rendering.poses = attempt.result.reached.final.poses
-        return verdicts(attempt.verdict), trial_outcome(attempt), predicted, promised
+        return verdicts(attempt.verdict), trial_outcome(attempt), predicted, predicted_success

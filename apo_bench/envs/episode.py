@@ -16,8 +16,8 @@ from apo_bench.assembly import Observation, Outcome
 from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
 from apo_bench.perception.observation.looking import Looks
-from apo_bench.perception.observation.noise import Level
-from apo_bench.records import Predicted, check, level_pair
+from apo_bench.perception.observation.noise import NoiseLevel
+from apo_bench.records import Predicted, check, noise_pair
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
@@ -32,13 +32,13 @@ MOST_TRIES = 30
 class Settings:
     """What may differ from episode to episode; checked when it is made."""
 
-    level: Level
-    careless: float
+    noise_level: NoiseLevel
+    human_error_scale: float
     clearance_mm: float | None
     """None stands for the scenario's."""
 
     def __post_init__(self) -> None:
-        check("careless", self.careless)
+        check("human_error_scale", self.human_error_scale)
         if self.clearance_mm is not None:
             check("clearance_mm", self.clearance_mm)
 
@@ -80,20 +80,20 @@ def asked_options(options: object, allowed: Sequence[str]) -> dict[str, Any]:
     return asked
 
 
-def with_options(usual: Settings, options: object, eye: str) -> Settings:
+def with_options(usual: Settings, options: object, pose_source: str) -> Settings:
     """The settings of an episode: the usual ones, but for what the options say.
 
     Raises:
         InputError: An option that there is not, or a value that is not allowed.
     """
     changes = asked_options(options, _OPTIONS)
-    if "level" in changes:
-        changes["level"] = Level(*level_pair(changes["level"], eye))
+    if "noise_level" in changes:
+        changes["noise_level"] = NoiseLevel(*noise_pair(changes["noise_level"], pose_source))
     return replace(usual, **changes)
 
 
 def watch_human(
-    scene: Scene, careless: float, eye: str, seed: int | None, rng: np.random.Generator
+    scene: Scene, human_error_scale: float, pose_source: str, seed: int | None, rng: np.random.Generator
 ) -> tuple[int, SimulatedDemonstration]:
     """Trial `seed`, or the next one of those that are drawn whose demonstration is right.
 
@@ -102,11 +102,11 @@ def watch_human(
     """
     for _ in range(1 if seed is not None else MOST_TRIES):
         trial = int(seed) if seed is not None else int(rng.integers(2**31))
-        simulated = simulate_demonstration(scene, careless, trial, eye)
+        simulated = simulate_demonstration(scene, human_error_scale, trial, pose_source)
         if seed is not None or simulated.demonstration.code == "ok":
             return trial, simulated
     raise InputError(
-        f"{MOST_TRIES} demonstrations of '{scene.scenario.name}' in a row went wrong at carelessness {careless:g} and "
+        f"{MOST_TRIES} demonstrations of '{scene.scenario.name}' in a row went wrong at carelessness {human_error_scale:g} and "
         f"{scene.clearance_mm:g} mm clearance; give less carelessness, or mend the scenario."
     )
 
@@ -174,7 +174,7 @@ def verdicts(verdict: Verdict) -> dict[str, bool]:
 
 
 def step_info(
-    verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None, promised: float | None
+    verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None, predicted_success: float | None
 ) -> dict[str, Any]:
     """What is said after a step: the verdicts, where the replay ended, and what the plan had said of itself."""
     return {
@@ -184,6 +184,6 @@ def step_info(
         "code": end.code,
         "operation": nullable(None if end.operation is None else end.operation + 1),
         "sentence": end.sentence,
-        **({} if predicted is None else {"predicted": predicted_info(predicted)}),
-        **({} if promised is None else {"promised": promised}),
+        **({} if predicted is None else {"failure_prediction": predicted_info(predicted)}),
+        **({} if predicted_success is None else {"predicted_success": predicted_success}),
     }

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.envs.apo_insert import ROBOT_ERROR, APOInsert
 from apo_bench.geometry import Array
-from apo_bench.records import NO_ROBOT_ERROR, TrialSettings
+from apo_bench.records import NO_ROBOT_ERROR, TrialConfig
 
 POLICIES: Mapping[str, str] = MappingProxyType(
     {
@@ -34,7 +34,7 @@ def expert(env: APOInsert, seen: dict[str, Any]) -> Array:
     return np.append(np.clip(-_GAIN * aside, -1.0, 1.0), 0.0)
 
 
-def insert_env(settings: TrialSettings) -> APOInsert:
+def insert_env(settings: TrialConfig) -> APOInsert:
     """The environment of such trials, made by Gymnasium; without a robot error, with its usual one.
 
     Raises:
@@ -43,8 +43,8 @@ def insert_env(settings: TrialSettings) -> APOInsert:
     env = gymnasium.make(
         "APOInsert-v0",
         scenario=settings.scenario,
-        level=(settings.level_mm, settings.level_deg),
-        **{name: getattr(settings, name) for name in ("careless", "noise", "grasp", "clearance_mm", "arm")},
+        noise_level=(settings.noise_mm, settings.noise_deg),
+        **{name: getattr(settings, name) for name in ("human_error_scale", "noise", "grasp", "clearance_mm", "arm")},
         corrector=settings.method,
         robot_error=ROBOT_ERROR if settings.robot_error == NO_ROBOT_ERROR else settings.robot_error,
     )

@@ -113,7 +113,7 @@ def insert_space(pixels: bool) -> spaces.Dict:
     return spaces.Dict(seen)
 
 
-def as_seen(
+def is_uncorrected(
     control: TipControl, covariance: Array, best: float, left: int, action: NDArray[np.float32]
 ) -> dict[str, Any]:
     """What is seen now, but for pictures.

@@ -15,11 +15,11 @@ from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.records import (
     NO_ROBOT_ERROR,
+    assumed_error,
+    checked_assumed_robot_error,
+    checked_ft_sensor,
     checked_robot_error,
-    checked_stated_error,
-    checked_wrench,
     robot_sigmas,
-    told_error,
 )
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
@@ -36,7 +36,7 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     stream_key,
 )
-from apo_bench.trial.trial import feels_of
+from apo_bench.trial.trial import probing_config
 
 LONGEST_REPLAY_S = 1000.0
 """Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
@@ -46,9 +46,9 @@ class RobotSettings(NamedTuple):
     """As the environment's arguments of these names."""
 
     robot_error: str
-    feels: bool
+    probing: bool
     wrench: str
-    stated_error: str
+    assumed_robot_error: str
 
     def checked(self) -> "RobotSettings":
         """The same, spelled as rows spell them.
@@ -58,7 +58,10 @@ class RobotSettings(NamedTuple):
         """
         error = checked_robot_error(self.robot_error)
         return RobotSettings(
-            error, bool(self.feels), checked_wrench(self.wrench), checked_stated_error(self.stated_error)
+            error,
+            bool(self.probing),
+            checked_ft_sensor(self.wrench),
+            checked_assumed_robot_error(self.assumed_robot_error),
         )
 
 
@@ -72,17 +75,17 @@ def carried_out(
         trial: Its number; the robot's errors, and the noise of what it feels, are those of this trial.
         watch, fidelity: As in `replay_and_judge`.
     """
-    told = told_error(robot.stated_error, robot.robot_error)
+    told = assumed_error(robot.assumed_robot_error, robot.robot_error)
     return replay_and_judge(
         plan,
         scene,
         reference,
         watch,
         fidelity,
-        searches=robot.feels,
+        spiral=robot.probing,
         most_s=LONGEST_REPLAY_S,
         error=draw_robot_error(robot.robot_error, scene, trial),
-        feels=feels_of(plan, scene, told, stream_key(trial, WRENCH), robot.wrench) if robot.feels else None,
+        probing=probing_config(plan, scene, told, stream_key(trial, WRENCH), robot.wrench) if robot.probing else None,
     )
 
 
@@ -130,15 +133,15 @@ class Trials(NamedTuple):
 
     scene: Scene
     operation: int
-    careless: float
+    human_error_scale: float
     noise: Noise
     corrector: Any
     robot: RobotSettings
 
     def begin(self, trial: int) -> Begun | Outcome:
         """Demonstrate, observe, correct, and carry out what comes before; or what failed on the way there."""
-        scene, k, careless, noise, corrector, robot = self
-        simulated = simulate_demonstration(scene, careless, trial)
+        scene, k, human_error_scale, noise, corrector, robot = self
+        simulated = simulate_demonstration(scene, human_error_scale, trial)
         if simulated.demonstration.code != "ok":
             return demonstration_failure(simulated.demonstration)
         seen = observe_demonstration(simulated, noise, trial)
@@ -147,10 +150,10 @@ class Trials(NamedTuple):
             assert made.failure is not None
             return made.failure
         key = stream_key(trial, WRENCH)
-        told = told_error(robot.stated_error, robot.robot_error)
-        feels = feels_of(made.plan, scene, told, key, robot.wrench) if robot.feels else None
+        told = assumed_error(robot.assumed_robot_error, robot.robot_error)
+        probing = probing_config(made.plan, scene, told, key, robot.wrench) if robot.probing else None
         error = draw_robot_error(robot.robot_error, scene, trial)
-        start = prepare(made.plan, scene, k, error, feels, (robot.wrench, (*key, 1)))
+        start = prepare(made.plan, scene, k, error, probing, (robot.wrench, (*key, 1)))
         if isinstance(start, Outcome):
             return start
         before = judged(scene, start.after, start.after[-1], simulated.layout.goals[:k]) if k else None

@@ -31,8 +31,8 @@ from typing import NamedTuple
 from apo_bench.errors import InputError, require, require_text, unknown
 
 NO_ROBOT_ERROR = "none"
-DRAWN = "drawn"
-_UNSTATED = "unstated"
+MATCHED = "matched"
+_UNKNOWN = "unknown"
 _LARGEST = 20.0
 """Standard deviation, [mm] or [deg]."""
 _UNITS = {"hand_eye": ("mm", "degrees"), "joints": ("degrees",), "tool": ("mm",), "in_hand": ("mm", "degrees")}
@@ -78,17 +78,17 @@ def checked_robot_error(name: str) -> str:
     return _spelled_error(robot_sigmas(name))
 
 
-def checked_stated_error(name: str) -> str:
+def checked_assumed_robot_error(name: str) -> str:
     """A stated error as rows spell it.
 
     Raises:
         InputError: It is neither `drawn` nor `unstated`, nor what `robot_sigmas` takes.
     """
     require_text("stated error", name)
-    if name in (DRAWN, _UNSTATED):
+    if name in (MATCHED, _UNKNOWN):
         return name
     if name != NO_ROBOT_ERROR and any(entry.partition(":")[0] not in _UNITS for entry in name.split("+")):
-        raise InputError(unknown("stated error", name, (DRAWN, _UNSTATED, NO_ROBOT_ERROR, *_UNITS)))
+        raise InputError(unknown("stated error", name, (MATCHED, _UNKNOWN, NO_ROBOT_ERROR, *_UNITS)))
     return _spelled_error(robot_sigmas(name, "stated error"))
 
 
@@ -98,15 +98,15 @@ def _spelled_error(sigmas: Sigmas) -> str:
     return "+".join(f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)) or NO_ROBOT_ERROR
 
 
-def told_error(stated_error: str, robot_error: str) -> str | None:
+def assumed_error(assumed_robot_error: str, robot_error: str) -> str | None:
     """How wrong a robot is said to be, as in `robot_sigmas`; None if nobody says.
 
     Args:
         stated_error, robot_error: As in rows.
     """
-    if stated_error == _UNSTATED:
+    if assumed_robot_error == _UNKNOWN:
         return None
-    return robot_error if stated_error == DRAWN else stated_error
+    return robot_error if assumed_robot_error == MATCHED else assumed_robot_error
 
 
 def _numbers(said: str, kind: str, sizes: str) -> tuple[float, float]:
@@ -132,28 +132,28 @@ def _spelled(size: tuple[float, ...]) -> str:
     return "/".join(repr(x).removesuffix(".0") for x in needed)
 
 
-class WrenchNoise(NamedTuple):
+class FtNoise(NamedTuple):
     """Standard deviations of one reading, per axis."""
 
     force_n: float
     torque_nm: float
 
 
-USUAL_WRENCH = "external"
+USUAL_FT_SENSOR = "wrist"
 _PRESETS = MappingProxyType(
     {
-        "ideal": WrenchNoise(0.0, 0.0),
-        "external": WrenchNoise(0.1, 0.005),
-        "external-coarse": WrenchNoise(0.2, 0.01),
-        "cobot": WrenchNoise(3.5, 0.2),
+        "ideal": FtNoise(0.0, 0.0),
+        "wrist": FtNoise(0.1, 0.005),
+        "wrist-coarse": FtNoise(0.2, 0.01),
+        "joint-torque": FtNoise(3.5, 0.2),
     }
 )
 _N_PER_NM = 20.0
-_MOST = WrenchNoise(10.0, 5.0)
+_MOST = FtNoise(10.0, 5.0)
 """A touch ends by six standard deviations of what is felt, 13.5 N with such a sensor: with 14 N it was a collision."""
 
 
-def wrench_noise(name: str) -> WrenchNoise:
+def ft_noise(name: str) -> FtNoise:
     """The noise that a name stands for.
 
     Raises:
@@ -175,15 +175,15 @@ def wrench_noise(name: str) -> WrenchNoise:
         f"{_MOST.torque_nm:g} Nm are allowed (with more N a touch is a collision before it is felt): 0.1/0.005, "
         f"or a name: {', '.join(_PRESETS)}.",
     )
-    return WrenchNoise(force, torque)
+    return FtNoise(force, torque)
 
 
-def checked_wrench(name: str) -> str:
+def checked_ft_sensor(name: str) -> str:
     """A sensor as rows spell it: by its name where it has one, else by numbers that read back as they are.
 
     Raises:
         InputError: As in `wrench_noise`.
     """
-    noise = wrench_noise(name)
+    noise = ft_noise(name)
     known = next((preset for preset, its in _PRESETS.items() if its == noise), None)
     return known or "/".join(repr(x).removesuffix(".0") for x in noise)

@@ -1,4 +1,4 @@
-"""What is to be known of a setting of a trial besides its name, type and default, said where the setting is stated."""
+"""Facts about a setting of a trial besides its name, type and default."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -22,26 +22,24 @@ class SettingInfo:
     """How a complaint about a number ends."""
     choices: tuple[str, ...] = ()
     spelled: Callable[[str], str] | None = None
-    """Checks a name and says how rows spell it."""
-    column: str = ""
-    """Of a row; the setting's own name if empty."""
+    """Checks a name and returns its canonical form."""
     option: str = ""
-    """Of the command line, without dashes; the setting's own name if empty."""
+    """Command-line option without leading dashes; default: the name of the setting."""
     scale: float = 1.0
     usual: str = ""
     """What help says of the default; the default itself if empty."""
     key: bool = False
-    """Whether it tells the trials of one sweep apart."""
-    axis: str = ""
-    """Field of `SweepSettings` and key of a sweep file, if a sweep has several of it."""
-    axis_option: str = ""
-    """Of `apo-bench sweep`; that of one trial if empty."""
+    """Whether it distinguishes the trials of one sweep."""
+    axis: bool = False
+    """Whether a sweep may have several values of it."""
     swept: tuple[Any, ...] = ()
-    """What a sweep has where nothing is said; the default alone if empty."""
+    """Default values of a sweep; default: the default of a trial."""
     shared: bool = False
-    """Whether a sweep has one for all of its trials."""
+    """Whether all trials of a sweep have the same."""
     scene: bool = False
-    """Whether a scene is compiled for it."""
+    """Whether the compiled scene depends on it."""
+    drawn: bool = False
+    """Whether it is of a random draw: null in the record of an observation from a file."""
     name: str = ""
     kind: Any = None
     """The type of the setting, with the range that it may have."""
@@ -52,6 +50,11 @@ class SettingInfo:
         """The smallest and the largest number."""
         (limits,) = self.kind.__metadata__
         return limits.ge, limits.le
+
+    @property
+    def words(self) -> str:
+        """The name in prose."""
+        return self.name.replace("_", " ")
 
     @property
     def keyword(self) -> str:

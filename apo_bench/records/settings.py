@@ -1,147 +1,155 @@
-"""What one trial is made of: every setting, stated once and checked at the door.
+"""The settings of a trial: the field `TrialConfig` states each once, with its range, its help and what else uses it.
 
-What else lists settings is made from this: columns and keys of rows, axes of sweeps, keys of sweep files, options and
-help of the command line, replay commands, and the tables of the documentation. The file is long because all that
-is to be known of a setting stands in one place.
+Columns of records, sweep axes, keys of sweep files, command-line options, environment arguments and the tables of the
+documentation are made from these fields. The file is long because everything about a setting stands in one place.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Annotated, Literal, Never, final, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Never, final, get_args, get_type_hints
 
 import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError, require, require_text
 from apo_bench.records.robot_error import (
-    DRAWN,
+    MATCHED,
     NO_ROBOT_ERROR,
-    USUAL_WRENCH,
+    USUAL_FT_SENSOR,
+    checked_assumed_robot_error,
+    checked_ft_sensor,
     checked_robot_error,
-    checked_stated_error,
-    checked_wrench,
 )
-from apo_bench.records.salt import Salt
+from apo_bench.records.secret_seed import SecretSeed
 from apo_bench.records.setting_info import SettingInfo, about, check_value
-from apo_bench.records.short_names import CORRECTOR, checked_method, checked_relations, feels
+from apo_bench.records.short_names import CORRECTOR, checked_contact_source, checked_method, probes
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/9"
-Eye = Literal["noise", "range"]
-"""Poses with noise that is drawn, or a simulated range finder that measures them."""
-RANGE = "range"
+RECORD_SCHEMA = "apo-bench/record/1"
+PoseSource = Literal["noise-model", "depth-camera"]
+NOISE_MODEL, DEPTH_CAMERA = get_args(PoseSource)
 USUAL = "isotropic"
-"""The noise model where none is asked for."""
-Fidelity = Literal["full", "contact"]
-"""Every motion is simulated, or the part of each in which things may touch."""
+"""The default noise model."""
+Fidelity = Literal["full", "near-contact"]
+NEAR_CONTACT = "near-contact"
 LARGEST_SEED = 2**53 - 1
-"""Whole numbers up to here survive every JSON reader."""
+"""The largest integer that every JSON reader keeps exactly."""
 LONGEST_NAME = 5000
-"""Letters; some names are paths."""
+"""Characters; some names are paths."""
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
-NoiseLevel = Annotated[float, Meta(ge=0.0, le=50.0)]
-"""[mm] or [degrees]: five times the largest is still inside the room."""
-CarelessnessValue = Annotated[float, Meta(ge=0.0, le=10.0)]
+NoiseSize = Annotated[float, Meta(ge=0.0, le=50.0)]
+"""[mm] or [deg]: at five standard deviations of the largest, parts are still inside the room."""
+HumanErrorScale = Annotated[float, Meta(ge=0.0, le=10.0)]
 ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
 Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
-Promise = Annotated[float, Meta(ge=0.0, le=1.0)]
-"""A probability of success."""
-LooksAllowed = Annotated[int, Meta(ge=0, le=100)]
+Probability = Annotated[float, Meta(ge=0.0, le=1.0)]
+ReobservationCount = Annotated[int, Meta(ge=0, le=100)]
 TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
-LEVEL = SettingInfo(
-    "Noise: mm and degrees, standard deviation",
-    option="level",
+NOISE_LEVEL = SettingInfo(
+    "Standard deviation of the observed poses per axis, in mm and in degrees",
+    option="noise-level",
     usual="1",
-    axis="levels",
-    axis_option="levels",
+    axis=True,
     swept=(0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0),
-    name="level",
-    kind=NoiseLevel,
+    name="noise_level",
+    kind=NoiseSize,
 )
-"""One number stands for `level_mm` and `level_deg`."""
-_PER_AXIS = "where 1 means a standard deviation of 1 mm and 1 degree"
-_PER_RAY = "where 1 means a standard deviation of 1 mm per ray"
+"""One number stands for `noise_mm` and `noise_deg`."""
+_PER_AXIS = "where 1 is a standard deviation of 1 mm and 1 degree per axis"
+_PER_RAY = "where 1 is a standard deviation of 1 mm per ray"
 
 
 @final
 @dataclass(frozen=True)
-class TrialSettings:
-    """One trial: with the same code and the same assets it determines its row, which has them in this order."""
+class TrialConfig:
+    """One trial: with the same version and the same files it determines its record.
 
-    scenario: Name = field(metadata=about(key=True, axis="scenarios"))
-    """A name, also `generated:SEED` or `generated:FAMILY:SEED`, or the path of a scenario file."""
-    level_mm: NoiseLevel = field(
+    A record has these settings as its first columns, in this order.
+    """
+
+    scenario: Name = field(metadata=about(key=True, axis=True))
+    """A scenario by name, also `generated:SEED` or `generated:FAMILY:SEED`, or the path of a scenario file."""
+    noise_mm: NoiseSize = field(
         default=1.0,
         metadata=about(
-            "Only the mm",
-            called="level in mm",
+            "Standard deviation of the observed positions per axis, in mm",
+            called="noise in mm",
             meaning=_PER_AXIS,
-            column="level",
-            usual="the level",
+            usual="the noise level",
             key=True,
+            drawn=True,
         ),
     )
-    """Standard deviation of the positions seen, per axis [mm]; with the eye `range`, of one ray."""
-    level_deg: NoiseLevel = field(
-        default=1.0,
-        metadata=about("Only the degrees", called="level in degrees", meaning=_PER_AXIS, usual="the level", key=True),
-    )
-    """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`."""
-    careless: CarelessnessValue = field(
+    """Standard deviation of the observed positions, per axis [mm]; with the pose source `depth-camera`, of one ray."""
+    noise_deg: NoiseSize = field(
         default=1.0,
         metadata=about(
-            "Carelessness of the human: 0 is a careful one, 1 the scenario's",
-            called="carelessness",
-            meaning="where 0 is a careful human and 1 the scenario's",
+            "Standard deviation of the observed rotation vectors per axis, in degrees",
+            called="noise in degrees",
+            meaning=_PER_AXIS,
+            usual="the noise level",
             key=True,
-            axis="careless",
+            drawn=True,
+        ),
+    )
+    """Standard deviation of the observed rotation vectors in the body frame, per axis [deg]; 0 with the pose source
+    `depth-camera`."""
+    human_error_scale: HumanErrorScale = field(
+        default=1.0,
+        metadata=about(
+            "Factor on the human error that the scenario states; 0 is an ideal human",
+            called="human error scale",
+            meaning="where 0 is an ideal human and 1 the human error that the scenario states",
+            key=True,
+            drawn=True,
+            axis=True,
             swept=(0.0, 1.0),
         ),
     )
-    """How far the human deviates: 0 is a careful one, 1 the scenario's, anything else a multiple."""
+    """Factor on the human error that the scenario states: 0 is an ideal human."""
     clearance_mm: ClearanceMm = field(
         default=0.25,
         metadata=about(
-            "Room between parts that fit, in mm per side",
+            "Clearance per side between parts that fit, in mm",
             called="clearance",
             meaning="in mm per side",
-            option="clearance",
             usual="the scenario's",
             key=True,
-            axis="clearances_mm",
+            axis=True,
             scene=True,
         ),
     )
-    """Room per side between parts that fit into one another [mm]."""
-    eye: str = field(
-        default="noise",
+    """Clearance per side between parts that fit into one another [mm]."""
+    pose_source: str = field(
+        default=NOISE_MODEL,
         metadata=about(
-            "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)",
-            called="eye",
-            choices=get_args(Eye),
-            axis="eyes",
+            "Where observed poses come from: noise-model, or depth-camera (estimated from simulated depth images; the "
+            "noise level is then in mm per ray)",
+            called="pose source",
+            choices=get_args(PoseSource),
+            axis=True,
         ),
     )
-    """`noise`, or `range`: poses are measured in depth images; `level_mm` is the noise of a ray then, `level_deg` is
-    zero and `noise` is `range`."""
+    """`noise-model`, or `depth-camera`: poses are estimated from simulated depth images; `noise_mm` is then the noise
+    of a ray, `noise_deg` is 0 and `noise` is `depth-camera`."""
     noise: Name = field(
         default=USUAL,
         metadata=about(
-            "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name",
+            "Noise model: a name from `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name",
             key=True,
-            axis="noises",
+            axis=True,
         ),
     )
     """A noise model, by name, as a file, or `module:name`."""
     grasp: Name = field(
         default="friction",
         metadata=about(
-            "friction, or weld for an ideal gripper",
+            "How the gripper holds parts: friction, or weld for an ideal gripper",
             called="grasp",
             choices=("friction", "weld"),
             key=True,
-            axis="grasps",
+            axis=True,
             scene=True,
         ),
     )
@@ -149,13 +157,13 @@ class TrialSettings:
     arm: Name = field(
         default="six_axis",
         metadata=about(
-            "A name out of `apo-bench arm list`, FILE.toml, menagerie:NAME (of MuJoCo Menagerie), robosuite:NAME, or "
-            "package.module:name",
+            "Robot arm: a name from `apo-bench arm list`, FILE.toml, menagerie:NAME (of MuJoCo Menagerie), "
+            "robosuite:NAME, or package.module:name",
             shared=True,
             scene=True,
         ),
     )
-    """The robot, by name, as a file, or `module:name`."""
+    """The robot arm, by name, as a file, or `module:name`."""
     robot_error: Name = field(
         default=NO_ROBOT_ERROR,
         metadata=about(
@@ -163,88 +171,89 @@ class TrialSettings:
             "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), or several joined by +",
             spelled=checked_robot_error,
             key=True,
-            axis="robot_errors",
+            axis=True,
         ),
     )
-    """What is wrong with the robot itself: `none`, or standard deviations by kind, `hand_eye:1/0.2+tool:0.5`."""
-    relations: Name = field(
+    """Errors of the robot itself: `none`, or standard deviations by kind, `hand_eye:1/0.2+tool:0.5`."""
+    contact_source: Name = field(
         default="given",
         metadata=about(
-            "What correctors are told of the contacts: given (right), recognised, "
-            "recognised-jointly, missed, false, shifted:3 (mm)",
-            spelled=checked_relations,
+            "Where the corrector's contacts come from: given (correct), detected, detected-jointly, or wrong ones: "
+            "false-negative, false-positive, shifted:3 (mm)",
+            spelled=checked_contact_source,
             key=True,
-            axis="relations",
+            axis=True,
         ),
     )
-    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-jointly`, or wrong ones: `missed`,
-    `false`, `shifted:3` (mm), or `module:name`."""
+    """Where the corrector's contacts come from: `given`, `detected`, `detected-jointly`, or wrong ones:
+    `false-negative`, `false-positive`, `shifted:3` (mm), or `module:name`."""
     method: Name = field(
         default=CORRECTOR,
         metadata=about(
-            "oracle, none, by-heart, search, a corrector or package.module:name; any of them with +search or +feel",
+            "oracle, uncorrected, nominal, spiral-search, a corrector or package.module:name; any of them with "
+            "+spiral or +probe",
             spelled=checked_method,
             key=True,
-            axis="methods",
-            axis_option="methods",
-            swept=("oracle", "none", "paper", CORRECTOR),
+            axis=True,
+            swept=("oracle", "uncorrected", "paper", CORRECTOR),
         ),
     )
-    """Who plans: `oracle`, `none`, `by-heart`, `search`, a corrector by name, or `module:name`; with `+search` the
-    robot feels for holes besides, with `+feel` it also finds out by touching how wrong it is itself."""
-    looks: LooksAllowed = field(
+    """What makes the plan: `oracle`, `uncorrected`, `nominal`, `spiral-search`, a corrector by name, or `module:name`.
+    With `+spiral` the robot searches for holes in a spiral; with `+probe` it also probes fixed surfaces to estimate its
+    own calibration error."""
+    max_reobservations: ReobservationCount = field(
         default=0,
         metadata=about(
-            "How often a corrector that can ask may look at operations again",
-            called="number of looks",
+            "How often a corrector may observe operations again",
+            called="number of reobservations",
             key=True,
-            axis="looks",
+            axis=True,
         ),
     )
-    """How often a corrector that can ask may look at operations again; each look has the errors of the first."""
-    wrench: Name = field(
-        default=USUAL_WRENCH,
+    """How often a corrector that asks for it may observe operations again, with the noise of the first observation."""
+    ft_sensor: Name = field(
+        default=USUAL_FT_SENSOR,
         metadata=about(
-            "The force and torque sensor at the wrist, with +feel only: ideal, external, external-coarse, cobot, or "
-            "its noise in N and Nm, 0.1/0.005",
-            spelled=checked_wrench,
+            "Force-torque sensor of a robot that probes: ideal, wrist, wrist-coarse, joint-torque, or its noise in N "
+            "and Nm, 0.1/0.005",
+            spelled=checked_ft_sensor,
             key=True,
-            axis="wrenches",
+            axis=True,
         ),
     )
-    """The force and torque sensor at the wrist: `ideal`, `external`, `external-coarse`, `cobot`, or standard deviations
-    of a reading in N and Nm, `0.1/0.005`. Without `+feel` nothing reads it."""
-    stated_error: Name = field(
-        default=DRAWN,
+    """The force-torque sensor at the wrist: `ideal`, `wrist`, `wrist-coarse`, `joint-torque`, or standard deviations
+    of a reading in N and Nm, `0.1/0.005`. Only methods with `+probe` read it."""
+    assumed_robot_error: Name = field(
+        default=MATCHED,
         metadata=about(
-            "How wrong the robot is said to be, with +feel only: drawn (the standard deviations of the robot error), "
-            "unstated, or standard deviations as those of a robot error",
-            spelled=checked_stated_error,
+            "Robot error that a robot that probes assumes: matched (the standard deviations of --robot-error), "
+            "unknown, or standard deviations",
+            spelled=checked_assumed_robot_error,
             key=True,
-            axis="stated_errors",
+            axis=True,
         ),
     )
-    """How wrong the robot is said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by
-    others, `hand_eye:1/0.2`. Without `+feel` nobody asks."""
-    abstain: Promise = field(
+    """The robot error that a robot that probes assumes: `matched`, the standard deviations of `robot_error`; `unknown`;
+    or standard deviations, `hand_eye:1/0.2`. Only methods with `+probe` use it."""
+    min_predicted_success: Probability = field(
         default=0.0,
         metadata=about(
-            "Carry out nothing that promises to succeed with less than this probability; 0 carries out everything",
-            called="promise to abstain below",
-            meaning="where 0 never abstains",
+            "Abstain from plans whose predicted success is lower; 0 executes every plan",
+            called="minimum predicted success",
+            meaning="where 0 executes every plan",
             key=True,
-            axis="abstains",
+            axis=True,
         ),
     )
-    """A plan whose `promised` is less is not carried out: no success."""
+    """A plan with a lower `predicted_success` is not executed and does not count as a success."""
     seed: Seed = field(default=0, metadata=about("Number of the trial", called="seed", key=True))
-    """Number of the trial: trials of one seed meet the same layout, human and noise."""
-    salt: Salt | None = field(
+    """Number of the trial: all methods meet the same layout, demonstration and noise at the same seed."""
+    secret_seed: SecretSeed | None = field(
         default=None,
         repr=False,
-        metadata=about("The salt of the sweep that the trial is of", option="salt-file", usual="none"),
+        metadata=about("File with the secret seed of the sweep", option="secret-seed-file", usual="none", drawn=True),
     )
-    """Enters every stream of chance; None for a trial that everybody can draw. A row has its hash."""
+    """Enters every random stream; None for a trial that anyone can draw. A record has its hash."""
     timestep_s: TimestepS = field(
         default=0.001,
         metadata=about(
@@ -259,100 +268,102 @@ class TrialSettings:
     fidelity: str = field(
         default="full",
         metadata=about(
-            "full, or contact: only the part of each motion in which things may touch is simulated",
+            "full, or near-contact: simulate only the part of each motion in which parts may touch",
             called="fidelity",
             choices=get_args(Fidelity),
             shared=True,
         ),
     )
-    """`full`, or `contact`: only the part of each motion in which things may touch is simulated."""
+    """`full`, or `near-contact`: only the part of each motion in which parts may touch is simulated."""
 
     def __post_init__(self) -> None:
         for info in SETTINGS.values():
             value = getattr(self, info.name)
             if info.is_text:
-                require_text(info.name.replace("_", " "), value)
+                require_text(info.words, value)
             elif isinstance(value, np.generic):
                 object.__setattr__(self, info.name, value.item())
         for info in _CHECKED:
-            check(info.name, getattr(self, info.name), self.eye)
+            check(info.name, getattr(self, info.name), self.pose_source)
             if info.spelled is not None:
                 object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
         check_together(self.fidelity, self.grasp)
-        check_squares(feels(self.method), self.grasp)
-        if self.eye == RANGE:
-            if self.noise not in (USUAL, RANGE):
+        check_grip(probes(self.method), self.grasp)
+        if self.pose_source == DEPTH_CAMERA:
+            if self.noise not in (USUAL, DEPTH_CAMERA):
                 refuse_noise(self.noise)
-            object.__setattr__(self, "noise", RANGE)
-            object.__setattr__(self, "level_deg", 0.0)
+            object.__setattr__(self, "noise", DEPTH_CAMERA)
+            object.__setattr__(self, "noise_deg", 0.0)
 
 
 def _settings() -> Iterable[SettingInfo]:
-    kinds = get_type_hints(TrialSettings, include_extras=True)
-    for setting in fields(TrialSettings):
+    kinds = get_type_hints(TrialConfig, include_extras=True)
+    for setting in fields(TrialConfig):
         name = setting.name
         info: SettingInfo = setting.metadata["info"]
-        column = info.column or name
         option = info.option or name.replace("_", "-")
-        yield replace(info, name=name, kind=kinds[name], default=setting.default, column=column, option=option)
+        yield replace(info, name=name, kind=kinds[name], default=setting.default, option=option)
 
 
 SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
-"""Name -> what is to be known of it, in the order of a row."""
+"""Settings by name, in the order of the columns of a record."""
 _CHECKED = tuple(info for info in SETTINGS.values() if info.called or info.spelled)
 
 
-def check(name: str, value: object, eye: str = "noise", called: str = "") -> None:
-    """Raise an `InputError` unless a setting may be this, whatever the others are.
+def check(name: str, value: object, pose_source: str = NOISE_MODEL, called: str = "") -> None:
+    """Raise an `InputError` unless a setting may have this value, whatever the others are.
 
     Args:
-        eye: What levels are of.
-        called: What to call it, if not as usual.
+        pose_source: What the noise level is of.
+        called: Name of the setting in the message; default: that of the setting.
     """
-    check_value(SETTINGS[name], value, called, _PER_RAY if name == "level_mm" and eye == RANGE else "")
+    per_ray = name == "noise_mm" and pose_source == DEPTH_CAMERA
+    check_value(SETTINGS[name], value, called, _PER_RAY if per_ray else "")
 
 
 def check_together(fidelity: str, *grasps: str) -> None:
     """Raise an `InputError` unless the verdicts of a fidelity are known to be those of `full` with these grasps."""
     require(
-        fidelity != "contact" or "weld" not in grasps,
-        "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
-        "use the grasp friction, or full.",
+        fidelity != NEAR_CONTACT or "weld" not in grasps,
+        "the fidelity 'near-contact' was given together with the grasp 'weld', with which its verdicts differ; "
+        "use the grasp friction, or the fidelity full.",
     )
 
 
-def check_squares(feels: bool, *grasps: str) -> None:
-    """Raise an `InputError` if a robot that feels, which squares parts between its pads, has none that close."""
+def check_grip(probes: bool, *grasps: str) -> None:
+    """Raise an `InputError` if a robot that probes, which aligns parts between its pads, has no pads that close."""
     require(
-        not feels or "weld" not in grasps,
-        "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close; use the "
-        "grasp friction, or a robot that does not feel.",
+        not probes or "weld" not in grasps,
+        "the grasp 'weld' was given for a method with +probe, which aligns parts between pads that close; use the "
+        "grasp friction, or a method without +probe.",
     )
 
 
-def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
-    """A level in mm and in degrees: one number stands for both, a pair for each; of a ray it is one, in mm."""
-    several = tuple(level) if isinstance(level, Iterable) and not isinstance(level, str) else (level,)
+def noise_pair(noise_level: float | Sequence[float], pose_source: str = NOISE_MODEL) -> tuple[float, float]:
+    """A noise level in mm and in degrees: one number stands for both, a pair for each; per ray it is one, in mm."""
+    is_sequence = isinstance(noise_level, Iterable) and not isinstance(noise_level, str)
+    several: tuple[Any, ...] = tuple(noise_level) if is_sequence else (noise_level,)  # type: ignore[arg-type]
     is_numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
     numbers = tuple(map(float, several)) if is_numbers else ()
     require(
-        eye != RANGE or len(numbers) == 1,
-        f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.",
+        pose_source != DEPTH_CAMERA or len(numbers) == 1,
+        f"the noise level {noise_level!r} was given with the pose source 'depth-camera'; give one number, mm per ray.",
     )
     require(
-        len(numbers) in (1, 2), f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees."
+        len(numbers) in (1, 2),
+        f"the noise level {noise_level!r} was given; give one number, or a pair of mm and degrees.",
     )
     mm = numbers[0]
-    deg = 0.0 if eye == RANGE else numbers[-1]
-    check("level_mm", mm, eye)
-    check("level_deg", deg)
+    deg = 0.0 if pose_source == DEPTH_CAMERA else numbers[-1]
+    check("noise_mm", mm, pose_source)
+    check("noise_deg", deg)
     return mm, deg
 
 
 def refuse_noise(*noises: object) -> Never:
-    """Raise an `InputError`: noise models were asked for where poses are measured, so they would draw nothing."""
+    """Raise an `InputError`: noise models were given with a pose source that draws no noise."""
     names = ", ".join(f"'{noise}'" for noise in noises if isinstance(noise, str))
     raise InputError(
-        f"the noise {names or 'model'} was given together with the eye 'range', which draws no pose noise; the level "
-        "is the noise of its rays in mm, so leave one of the two out."
+        f"the noise {names or 'model'} was given together with the pose source 'depth-camera', which draws no pose "
+        "noise; the noise level is the noise of its rays in mm, so leave one of the two out."
     )

@@ -1,16 +1,13 @@
-"""Everything that rows and the command line call by a short name, and where it is: names alone, nothing is imported.
+"""Short names of correctors, methods and contact sources: strings only, `apo_bench.names.resolve` imports the objects.
 
-Whoever needs the object behind a name asks `apo_bench.names.resolve`.
+Contact sources:
 
-What a corrector is told of the contacts, by the names that rows use.
-
-`given`             the right ones
-`missed`, `false`   one too few, one too many
-`shifted:3`         one face is not where the model of its part says, by 3 mm
-`recognised`        found in what was seen; `recognised-jointly` decides contacts and poses together
-`module:name`       a function of somebody's own
-
-What a method is called: what the robot is told to do, and whether it searches for holes or feels meanwhile.
+`given`             the correct contacts
+`false-negative`    one contact is missing
+`false-positive`    one contact too many
+`shifted:3`         one face is 3 mm away from where the model of its part has it
+`detected`          detected in the observed poses; `detected-jointly` estimates contacts and poses together
+`module:name`       your own function
 """
 
 import math
@@ -36,22 +33,22 @@ CORRECTORS = MappingProxyType(
 """The correctors that need an observation and nothing else."""
 CORRECTOR = "contact-robust"
 """The corrector where none is asked for."""
-LOOKING = ("contact-robust",)
-"""Correctors that can ask to see operations again."""
-SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.scene.settling:settle"})
+REOBSERVING = ("contact-robust",)
+"""Correctors that may observe operations again."""
+SIMULATED = MappingProxyType({"physics-settle": "apo_bench.simulation.scene.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
-UNCORRECTED = ("oracle", "none", "by-heart")
-"""Plans without a corrector: the truth, what was seen, the scenario's own goals where they fit best what was seen."""
-METHODS = (*UNCORRECTED, *CORRECTORS, *SIMULATED)
-"""What a robot can be told to do: a plan without a corrector, or by one."""
-WRONG_RELATIONS = MappingProxyType(
+WITHOUT_CORRECTOR = ("oracle", "uncorrected", "nominal")
+"""Plans without a corrector: the true poses, the observed poses, the scenario's own poses fitted to the observed ones."""
+METHODS = (*WITHOUT_CORRECTOR, *CORRECTORS, *SIMULATED)
+"""Methods by name."""
+WRONG_CONTACTS = MappingProxyType(
     {
-        "missed": "apo_bench.perception.observation.relations:missed",
-        "false": "apo_bench.perception.observation.relations:false",
-        "shifted": "apo_bench.perception.observation.relations:Shifted",
+        "false-negative": "apo_bench.perception.observation.wrong_contacts:missed",
+        "false-positive": "apo_bench.perception.observation.wrong_contacts:false",
+        "shifted": "apo_bench.perception.observation.wrong_contacts:Shifted",
     }
 )
-"""Wrong relations that a corrector is told."""
+"""Sources of wrong contacts."""
 FOREIGN_ARMS = ("menagerie:", "robosuite:")
 """How the arms of other collections begin; what follows is looked up there, and never imported."""
 FAILURES = ("flips", "stale", "swaps", "rays", "displaced-view")
@@ -62,16 +59,16 @@ RESIDUALS = "empirical:"
 
 
 GIVEN = "given"
-"""The contacts come with the demonstration, and are right."""
-WRONG = tuple(WRONG_RELATIONS)
-RECOGNISED = ("recognised", "recognised-jointly")
-_KINDS = (GIVEN, *WRONG, *RECOGNISED)
+"""The correct contacts, which come with the demonstration."""
+WRONG = tuple(WRONG_CONTACTS)
+DETECTED = ("detected", "detected-jointly")
+_KINDS = (GIVEN, *WRONG, *DETECTED)
 SHIFT_MM = 2.0
 _LARGEST_SHIFT_MM = 50.0
 
 
-def relations_name(text: str) -> str:
-    """How rows spell it: `shifted` stands for 2 mm, `shifted:3.0` is `shifted:3`.
+def contact_source_name(text: str) -> str:
+    """The canonical name of a contact source: `shifted` is `shifted:2`, `shifted:3.0` is `shifted:3`.
 
     Raises:
         InputError: A size that is not allowed.
@@ -85,97 +82,99 @@ def relations_name(text: str) -> str:
         size_mm = math.nan
     require(
         0.0 < size_mm <= _LARGEST_SHIFT_MM,
-        f"the relations '{text}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: shifted:3.",
+        f"the contact source '{text}' was given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
+        "shifted:3.",
     )
     return f"shifted:{size_mm:g}"
 
 
-def checked_relations(text: str) -> str:
-    """The relations as rows spell them; raise an `InputError` unless there are such."""
-    require_text("relations", text)
-    name = relations_name(text)
+def checked_contact_source(text: str) -> str:
+    """The canonical name of a contact source; raise an `InputError` if there is no such source."""
+    require_text("contact source", text)
+    name = contact_source_name(text)
     require(
         name.partition(":")[0] not in _KINDS or name in _KINDS or name.startswith("shifted:"),
-        f"the relations '{text}' were given; only shifted has a size, as in shifted:3.",
+        f"the contact source '{text}' was given; only shifted has a size, as in shifted:3.",
     )
     if ":" not in name and name not in _KINDS:
-        raise InputError(unknown("kind of relations", text, _KINDS) + " Or give your own as 'package.module:name'.")
+        raise InputError(unknown("contact source", text, _KINDS) + " Or give your own as 'package.module:name'.")
     return name
 
 
-_SEARCH = "search"
-"""What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
-_SEARCH_SUFFIX = f"+{_SEARCH}"
-_FEEL_SUFFIX = "+feel"
-"""After any method: a robot that finds out by touching how wrong it is itself."""
+SPIRAL_SEARCH = "spiral-search"
+"""The observed poses, executed by a robot that searches for holes in a spiral."""
+_SPIRAL = "+spiral"
+"""After any other method: the robot searches for holes in a spiral."""
+_PROBE = "+probe"
+"""After any method: the robot probes fixed surfaces to estimate its own calibration error."""
 
 
 class Method(NamedTuple):
-    """A method in its parts."""
+    """A parsed method."""
 
-    plan: str
-    """Where the plan comes from: `oracle`, `none`, `by-heart`, or a corrector."""
-    searches: bool
-    """Whether the robot feels for holes; one that feels does so as its last resort."""
-    feels: bool
+    corrector: str
+    """What makes the plan: `oracle`, `uncorrected`, `nominal`, or a corrector."""
+    spiral: bool = False
+    """Whether the robot searches for holes in a spiral; one that probes does so as a last resort."""
+    probe: bool = False
+    """Whether the robot probes fixed surfaces."""
 
 
-def parsed(method: str) -> Method:
+def parse_method(method: str) -> Method:
     """The parts of a method's name."""
-    if method == _SEARCH:
-        return Method("none", True, False)
-    if method.endswith(_FEEL_SUFFIX):
-        return Method(method.removesuffix(_FEEL_SUFFIX), True, True)
-    return Method(method.removesuffix(_SEARCH_SUFFIX), method.endswith(_SEARCH_SUFFIX), False)
+    if method == SPIRAL_SEARCH:
+        return Method("uncorrected", spiral=True)
+    if method.endswith(_PROBE):
+        return Method(method.removesuffix(_PROBE), spiral=True, probe=True)
+    return Method(method.removesuffix(_SPIRAL), spiral=method.endswith(_SPIRAL))
 
 
 def checked_method(method: str) -> str:
-    """A method's name as rows spell it: `none+search` is `search`.
+    """The canonical name of a method: `uncorrected+spiral` is `spiral-search`.
 
     Raises:
-        InputError: It is not `oracle`, `none`, `by-heart`, `search`,
-            a corrector by name, or `module:name`, nor one with `+search`
-            or `+feel`.
+        InputError: It is not `oracle`, `uncorrected`, `nominal`, `spiral-search`, a corrector by name, or
+            `module:name`, nor one with `+spiral` or `+probe`.
     """
     require_text("method", method)
-    plan, searches, by_touch = parsed(method)
+    corrector, spiral, probe = parse_method(method)
     require(
-        not searches or not parsed(plan).searches,
-        f"the method '{method}' was given; one of +search and +feel, which searches too, is said once, as in "
-        "contact+feel.",
+        not spiral or not parse_method(corrector).spiral,
+        f"the method '{method}' was given; use one of +spiral and +probe, which includes it, once, as in "
+        "contact+probe.",
     )
-    if ":" not in plan and plan not in METHODS:
+    if ":" not in corrector and corrector not in METHODS:
         raise InputError(
-            unknown("method", plan or method, (*METHODS, _SEARCH))
-            + " Or give your own corrector as 'package.module:name'; any of them may be followed by +search or +feel."
+            unknown("method", corrector or method, (*METHODS, SPIRAL_SEARCH))
+            + " Or give your own corrector as 'package.module:name'; +spiral or +probe may follow any of them."
         )
-    return _SEARCH if searches and not by_touch and plan == "none" else method
+    return SPIRAL_SEARCH if spiral and not probe and corrector == "uncorrected" else method
 
 
 def knows_truth(method: str) -> bool:
-    """Whether a method replays the drawn layout, so that it meets neither noise nor carelessness."""
-    return parsed(method).plan == "oracle"
+    """Whether a method replays the true poses, so that neither noise nor human error affects it."""
+    return parse_method(method).corrector == "oracle"
 
 
-def as_seen(method: str) -> bool:
-    """Whether a method replays what was seen."""
-    return parsed(method).plan == "none"
+def is_uncorrected(method: str) -> bool:
+    """Whether a method replays the observed poses."""
+    return parse_method(method).corrector == "uncorrected"
 
 
-def knows_relations(method: str) -> bool:
-    """Whether a method is told what touches what: whether it has a corrector."""
-    return parsed(method).plan not in UNCORRECTED
+def uses_contacts(method: str) -> bool:
+    """Whether a method uses contacts: whether it has a corrector."""
+    return parse_method(method).corrector not in WITHOUT_CORRECTOR
 
 
-def may_look(method: str) -> bool:
-    """Whether a method may ask to see operations again: one of those that do, or a corrector of one's own."""
-    plan = parsed(method).plan
-    return plan in LOOKING or ":" in plan
+def may_reobserve(method: str) -> bool:
+    """Whether a method may observe operations again: a corrector that does so, or your own."""
+    corrector = parse_method(method).corrector
+    return corrector in REOBSERVING or ":" in corrector
 
 
-def feels(method: str) -> bool:
-    """Whether a robot carries out the plan of a method that feels, so that it has a sensor at its wrist."""
-    return parsed(method).feels
+def probes(method: str) -> bool:
+    """Whether the robot of a method probes, so that it has a force-torque sensor at its wrist."""
+    return parse_method(method).probe
 
 
 def with_simulated(corrector: Any) -> Any:

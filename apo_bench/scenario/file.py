@@ -22,8 +22,8 @@ from apo_bench.scenario.attach_lines import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.generated import generated_file, is_generated, whole_name
-from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
-from apo_bench.scenario.tables import CarelessTable, JudgeTable, ScenarioTable, SiteTable
+from apo_bench.scenario.scenario import HumanError, Scenario, Shift, Site, Turn
+from apo_bench.scenario.tables import HumanErrorTable, JudgeTable, ScenarioTable, SiteTable
 from apo_bench.scenario.values import check_span, normalize_axis
 
 
@@ -132,7 +132,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         site=_site(top.site, f"{path}, site"),
         shifts=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Shift)),
         turns=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Turn)),
-        careless=None if top.careless is None else _careless(top.careless, f"{path}, careless", entries),
+        human_error=None if top.human_error is None else _careless(top.human_error, f"{path}, careless", entries),
         thresholds=Thresholds(**judge),
         success_means=success_means,
         clearance_mm=top.clearance_mm,
@@ -149,11 +149,11 @@ def _site(table: SiteTable, place: str) -> Site:
     return Site((1e-3 * x, 1e-3 * y), (1e-3 * wide, 1e-3 * deep), (float(np.radians(low)), float(np.radians(high))))
 
 
-def _careless(table: CarelessTable, place: str, entries: tuple[OperationEntry, ...]) -> Carelessness:
+def _careless(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
     known = 1 <= table.operation <= len(entries)
     require(known, f"{place}, operation: an operation from 1 to {len(entries)} is needed, {table.operation} was given.")
     axis = normalize_axis(table.along, f"{place}, along")
     level = abs((entries[table.operation - 1].goal[:3, :3] @ axis)[2]) <= 1e-6
     require(level, f"{place}, along: a direction that is level at the goal is needed.")
     low, high = check_span(table.size_mm, f"{place}, size_mm")
-    return Carelessness(table.operation - 1, axis, 1e-3 * low, 1e-3 * high)
+    return HumanError(table.operation - 1, axis, 1e-3 * low, 1e-3 * high)

@@ -41,12 +41,12 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
     offsets = np.zeros((len(assembly), 3))
     displaced = _Displaced()
     left = ()
-    if scenario.careless is None or not offset.any():
+    if scenario.human_error is None or not offset.any():
         return ErrorSpread(offsets, left)
     stages = (layout.start, *placements(assembly, layout.start, layout.goals))
     for k, operation in enumerate(assembly.operations):
         R = layout.goals[k][:3, :3]
-        if k == scenario.careless.operation:
+        if k == scenario.human_error.operation:
             offsets[k] = offset
         elif k < len(assembly) - 1:
             offsets[k] = R.T @ _guided(assembly, operation, stages[k + 1], displaced)
@@ -54,12 +54,12 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
     return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
 
 
-def careless_covariance(scenario: Scenario, careless: float) -> Array:
+def human_error_covariance(scenario: Scenario, human_error_scale: float) -> Array:
     """(n, 6, 6) [m^2]: the mean square of each operation's error along its own direction, zero where there is none."""
     covariance = np.zeros((len(scenario.assembly), 6, 6))
-    if scenario.careless is not None:
-        rms = careless * scenario.careless.rms_m
-        way = spread_error(scenario, Layout(scenario.goals, scenario.start), scenario.careless.axis).offsets
+    if scenario.human_error is not None:
+        rms = human_error_scale * scenario.human_error.rms_m
+        way = spread_error(scenario, Layout(scenario.goals, scenario.start), scenario.human_error.axis).offsets
         covariance[:, :3, :3] = rms**2 * np.einsum("ni,nj->nij", way, way)
     return covariance
 

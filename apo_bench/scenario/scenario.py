@@ -89,7 +89,7 @@ class Site:
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
-class Carelessness:
+class HumanError:
     """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
 
     operation: int
@@ -137,7 +137,7 @@ class Scenario:
     grasps: tuple[Grasp, ...]
     site: Site
     shifts: tuple[Shift, ...]
-    careless: Carelessness | None
+    human_error: HumanError | None
     thresholds: Thresholds
     clearance_mm: float
     gap_mm: float

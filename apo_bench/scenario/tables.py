@@ -86,7 +86,7 @@ class SiteTable(Table, frozen=True, kw_only=True):
     yaw_deg: tuple[Angle, Angle] = (0.0, 0.0)
 
 
-class CarelessTable(Table, frozen=True, kw_only=True):
+class HumanErrorTable(Table, frozen=True, kw_only=True):
     """`[careless]`."""
 
     operation: int
@@ -119,5 +119,5 @@ class ScenarioTable(Table, frozen=True, kw_only=True):
     clearance_mm: Annotated[float, Meta(ge=0.0, le=_LARGEST_CLEARANCE_MM)] = 0.25
     gap_mm: Annotated[float, Meta(gt=0.0, le=_LARGEST_CLEARANCE_MM)] = 0.1
     site: SiteTable = SiteTable()
-    careless: CarelessTable | None = None
+    human_error: HumanErrorTable | None = None
     judge: dict[str, Any] = msgspec.field(default_factory=dict)

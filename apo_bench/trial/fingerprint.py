@@ -17,11 +17,11 @@ from types import MappingProxyType
 
 from apo_bench import __version__
 from apo_bench.formats.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
-from apo_bench.records import ROW, TrialSettings
+from apo_bench.records import RECORD_SCHEMA, TrialConfig
 from apo_bench.scenario import Scenario
 from apo_bench.trial.inputs import content_pieces, digest, noise_content, own_content
 
-_SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
+_SCHEMAS = (RECORD_SCHEMA, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 PACKAGES_WITHOUT_TRIALS = ("benchmark", "cli", "envs", "importers", "viz")
 """Commands, imports that end in files, how work is spread, and all that is made of rows afterwards."""
 
@@ -76,7 +76,7 @@ def sources(package: Traversable, prefix: str = "") -> Iterator[tuple[str, bytes
             yield prefix + entry.name, entry.read_bytes().replace(b"\r\n", b"\n")
 
 
-def spec_hash(spec: TrialSettings, content: str, observation: str = "") -> str:
+def config_hash(spec: TrialConfig, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
 
     A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well;
@@ -88,8 +88,12 @@ def spec_hash(spec: TrialSettings, content: str, observation: str = "") -> str:
         content: From `content_hash`.
         observation: The text of the observation's file, when it was not drawn.
     """
-    settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario", "salt")}
-    if spec.salt is not None:
-        settings["salt"] = spec.salt.hash
-    brought = {**noise_content(spec.noise), **own_content("relations", spec.relations), **own_content("arm", spec.arm)}
+    settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario", "secret_seed")}
+    if spec.secret_seed is not None:
+        settings["secret_seed"] = spec.secret_seed.hash
+    brought = {
+        **noise_content(spec.noise),
+        **own_content("contact_source", spec.contact_source),
+        **own_content("arm", spec.arm),
+    }
     return digest(json.dumps([content, settings, observation, *brought.values()], sort_keys=True).encode())

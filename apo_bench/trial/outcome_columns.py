@@ -16,27 +16,38 @@ from typing import cast
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Correction, Felt, InHand, Observation, Outcome, Plan, Poses, Reached, Snapshot
+from apo_bench.assembly import (
+    Assembly,
+    Correction,
+    InHand,
+    Observation,
+    Outcome,
+    Plan,
+    Poses,
+    ProbingResult,
+    Reached,
+    Snapshot,
+)
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, pose, turned_alike
 from apo_bench.io import clean
-from apo_bench.perception.observation.relations import culprit
+from apo_bench.perception.observation.wrong_contacts import culprit
 from apo_bench.records import (
     ENV_ID,
     LONGEST_SENTENCE,
-    ROW,
-    ROW_FIELDS,
+    RECORD_FIELDS,
+    RECORD_SCHEMA,
     MovedInHand,
-    Row,
-    TrialSettings,
+    TrialConfig,
+    TrialRecord,
     finite,
     sentence,
     setting_columns,
 )
 from apo_bench.scenario import Scenario, load_scenario
-from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.fingerprint import config_hash
 from apo_bench.trial.planning import MethodResult
 from apo_bench.trial.stages import Attempt
 
@@ -108,7 +119,7 @@ def _row_space(J: Array) -> Array:
 
 def confidence_columns(
     result: MethodResult, observation: Observation, corrector_input: Observation, truth: Array | None
-) -> Row:
+) -> TrialRecord:
     """The test of the correction, whether the truth lies in its posterior, and how far the plan is from the truth.
 
     Args:
@@ -118,27 +129,30 @@ def confidence_columns(
     """
     right = observation.assembly
     given_assembly = corrector_input.assembly
-    wrong: Row = {"wrong_relation": None if given_assembly is right else culprit(right, given_assembly)}
+    wrong: TrialRecord = {"wrong_contact": None if given_assembly is right else culprit(right, given_assembly)}
     return wrong | _test(result.correction) | _truth(result, right, corrector_input, truth)
 
 
-def _test(correction: Correction | None) -> Row:
+def _test(correction: Correction | None) -> TrialRecord:
     if correction is None:
         return {}
-    left_out: Row = {"dropped": list(correction.dropped), "left_out": [k + 1 for k in correction.left_out]}
+    left_out: TrialRecord = {
+        "dropped": list(correction.dropped),
+        "inferred_operations": [k + 1 for k in correction.left_out],
+    }
     test = correction.test
     if test is None:
         return left_out
     return left_out | {
         "chi_square": float(test.chi_square) if math.isfinite(test.chi_square) else None,
-        "chi_square_freedom": int(test.freedom),
+        "chi_square_dof": int(test.freedom),
         "p_value": finite(test.p_value),
         "test_passes": bool(test.passes),
         "suspects": [suspect.relation for suspect in test.ambiguous],
     }
 
 
-def _truth(result: MethodResult, right: Assembly, corrector_input: Observation, truth: Array | None) -> Row:
+def _truth(result: MethodResult, right: Assembly, corrector_input: Observation, truth: Array | None) -> TrialRecord:
     if truth is None:
         return {}
     correction = result.correction
@@ -151,16 +165,20 @@ def _truth(result: MethodResult, right: Assembly, corrector_input: Observation, 
     }
 
 
-def method_columns(result: MethodResult) -> Row:
+def method_columns(result: MethodResult) -> TrialRecord:
     """What the method did, and what carrying it out would take beyond doing every operation once."""
     extra = None if result.plan is None else len(result.plan.schedule) - len(result.plan.assembly)
     moved = None if result.fitting is None else result.fitting.moves
     freed, tried = ((), ()) if result.correction is None else (result.correction.freed, result.correction.tried)
     return {
-        "freed": _numbers(freed),
-        "tried": [{"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in tried],
+        "corrected_operations": _numbers(freed),
+        "tried_corrections": [
+            {"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in tried
+        ],
         "extra_operations": extra,
-        "free_moved": None if moved is None else [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moved],
+        "fit_adjustments": None
+        if moved is None
+        else [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moved],
         "gap_before_mm": _mm(result.gap_before_m),
         "gap_after_mm": _mm(result.gap_after_m),
     }
@@ -171,7 +189,7 @@ def _numbers(operations: Iterable[int]) -> list[int]:
     return [int(k) + 1 for k in operations]
 
 
-def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
+def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRecord:
     """What a replay reached, and how far that is from the truth, (n, 4, 4), where it is known."""
     result = attempt.result
     verdict = attempt.verdict
@@ -186,26 +204,26 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
         "worst_angle_deg": finite(conditions.angle_deg),
         "least_overlap": finite(conditions.overlap),
         "penetration_mm": finite(conditions.penetration_mm),
-        "pushed_mm": finite(conditions.pushed_mm),
+        "displaced_mm": finite(conditions.displaced_mm),
         "reached": _poses(result.reached.final),
         "pose_error_fixed_mm": finite(fixed),
         "pose_error_free_mm": finite(free),
         "peak_force_n": finite(result.peak_force_n),
-        "moved_in_hand": [_moved(each) for each in result.in_hand],
-        "sim_seconds": result.sim_seconds,
+        "grasp_slip": [_moved(each) for each in result.in_hand],
+        "sim_time_s": result.sim_time_s,
     } | _felt(result.felt)
 
 
-def _felt(felt: Felt | None) -> Row:
+def _felt(felt: ProbingResult | None) -> TrialRecord:
     if felt is None:
         return {}
     return {
-        "touches": felt.touches,
-        "touches_refused": felt.refused,
-        "felt_mm": felt.mm,
-        "felt_deg": felt.deg,
-        "felt_sure_mm": felt.sure_mm,
-        "felt_sure_deg": felt.sure_deg,
+        "probe_contacts": felt.touches,
+        "probe_contacts_rejected": felt.refused,
+        "base_error_estimate_mm": felt.mm,
+        "base_error_estimate_deg": felt.deg,
+        "base_error_std_mm": felt.sure_mm,
+        "base_error_std_deg": felt.sure_deg,
     }
 
 
@@ -231,24 +249,26 @@ def _mm(metres: float) -> float | None:
     return finite(metres * 1e3)
 
 
-_OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
+_OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", RECORD_FIELDS))
 """Columns of what came out."""
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 
 
-def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
+def head(spec: TrialConfig, scenario: Scenario, hashed: str) -> TrialRecord:
     """What was asked for.
 
     Args:
-        hashed: From `spec_hash`.
+        hashed: From `config_hash`.
     """
-    versions = {"schema": ROW, "env_id": ENV_ID, "spec_hash": hashed}
-    return cast(Row, versions | setting_columns(spec, scenario.name) | {"thresholds": asdict(scenario.thresholds)})
+    versions = {"schema": RECORD_SCHEMA, "env_id": ENV_ID, "config_hash": hashed}
+    return cast(
+        TrialRecord, versions | setting_columns(spec, scenario.name) | {"thresholds": asdict(scenario.thresholds)}
+    )
 
 
-def result(end: Outcome, *, success: bool | None) -> Row:
+def result(end: Outcome, *, success: bool | None) -> TrialRecord:
     """The rest of a row of which nothing but its ending is known."""
-    known: Row = {
+    known: TrialRecord = {
         "success": success,
         "as_demonstrated": success,
         "loose_success": success,
@@ -257,10 +277,10 @@ def result(end: Outcome, *, success: bool | None) -> Row:
         "failure_operation": None if end.operation is None else end.operation + 1,
         "sentence": clean(end.sentence)[:LONGEST_SENTENCE],
     }
-    return cast(Row, dict.fromkeys(_OUTCOME_COLUMNS)) | known
+    return cast(TrialRecord, dict.fromkeys(_OUTCOME_COLUMNS)) | known
 
 
-def lost(spec: TrialSettings, content: str, code: str) -> Row:
+def lost(spec: TrialConfig, content: str, code: str) -> TrialRecord:
     """The failed row of a trial whose process died (`worker_died`) or took too long.
 
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
@@ -272,7 +292,7 @@ def lost(spec: TrialSettings, content: str, code: str) -> Row:
     return _failed(spec, content, None, Outcome("worker", code, None, sentence(code)))
 
 
-def misbehaved(spec: TrialSettings, content: str, demonstration: str, why: str) -> Row:
+def misbehaved(spec: TrialConfig, content: str, demonstration: str, why: str) -> TrialRecord:
     """The failed row of a trial whose corrector raised an error or returned what it must not.
 
     Args:
@@ -282,6 +302,6 @@ def misbehaved(spec: TrialSettings, content: str, demonstration: str, why: str) 
     return _failed(spec, content, demonstration, Outcome("correct", "raised", None, why))
 
 
-def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Outcome) -> Row:
-    settings = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
+def _failed(spec: TrialConfig, content: str, demonstration: str | None, end: Outcome) -> TrialRecord:
+    settings = head(spec, load_scenario(spec.scenario), config_hash(spec, content))
     return settings | {"demonstration": demonstration} | result(end, success=False)

@@ -1,8 +1,8 @@
 """What a method makes of an observation: a plan, or why there is none; and what speaks against a plan.
 
-Nominal goals put to where things were seen; best of all they fit in the baseline `by-heart`.
+Nominal goals put to where things were seen; best of all they fit in the baseline `nominal`.
 
-`by-heart` reads the nominal goals of the scenario, which no corrector may, and no contact. Whatever the relative
+`nominal` reads the nominal goals of the scenario, which no corrector may, and no contact. Whatever the relative
 goals of a layout are, it builds the same assembly.
 """
 
@@ -103,7 +103,7 @@ def apply_method(
     """What a method would have the robot do.
 
     Args:
-        method: `oracle` takes the truth, `none` what was seen, `by-heart` the goals of the scenario of `where`;
+        method: `oracle` takes the truth, `none` what was seen, `nominal` the goals of the scenario of `where`;
             anything else is a corrector or names one.
         observation: As the planner has it: its contacts may be missed, false or recognised, and are those of the plan.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
@@ -113,9 +113,9 @@ def apply_method(
     """
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _uncorrected(observation, truth, None)
-    if isinstance(method, str) and method == "none":
+    if isinstance(method, str) and method == "uncorrected":
         return _uncorrected(observation, observation.goals, observation_failure(observation))
-    if isinstance(method, str) and method == "by-heart" and where is not None:
+    if isinstance(method, str) and method == "nominal" and where is not None:
         return _by_heart(observation, where)
     correction = correct(observation, with_simulated(method), look)
     if not correction.ok:

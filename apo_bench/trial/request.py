@@ -12,13 +12,13 @@ from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
 from apo_bench.records import (
-    LEVEL,
-    RANGE,
-    RECOGNISED,
-    Row,
-    TrialSettings,
+    DEPTH_CAMERA,
+    DETECTED,
+    NOISE_LEVEL,
+    TrialConfig,
+    TrialRecord,
     in_python,
-    read_salt,
+    read_secret_seed,
 )
 from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
@@ -26,8 +26,9 @@ from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
-from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.outcome_columns import lost
+from apo_bench.trial.rollout import Rollout, trial_story
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
@@ -35,13 +36,12 @@ from apo_bench.trial.stages import (
     observe_demonstration,
     scene_of,
 )
-from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured, trial_row
 
-Show = Callable[[Story], None]
+Show = Callable[[Rollout], None]
 _DRAWN = (
-    *(LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations"),
-    *("eye", "looks", "robot_error", "seed", "salt_file"),
+    *(NOISE_LEVEL.name, "noise_mm", "noise_deg", "human_error_scale", "noise", "contact_source"),
+    *("pose_source", "max_reobservations", "robot_error", "seed", "secret_seed_file"),
 )
 """What has no meaning for an observation that comes from a file, though its contacts may be recognised."""
 _MEASURED_AIR_M = 5e-3
@@ -55,14 +55,14 @@ class Request:
 
     scenario: str
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Option as an argument (`level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
+    """Option as an argument (`noise_level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
     """
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
 
 
-def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
+def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
     """The settings that a request means.
 
     Args:
@@ -74,18 +74,18 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
     options = {name: value for name, value in request.options.items() if value is not None}
     if request.observation:
         _refuse_contradictions(request, options)
-    for name in ("noise", "level_deg"):
+    for name in ("noise", "noise_deg"):
         require(
-            options.get("eye") != RANGE or name not in options,
-            f"{_option(name)} was given together with --eye range, which draws no pose noise; "
-            "--level is the noise of its rays in mm.",
+            options.get("pose_source") != DEPTH_CAMERA or name not in options,
+            f"{_option(name)} was given together with --pose-source depth-camera, which draws no pose noise; "
+            "--noise-level is the noise of its rays in mm.",
         )
     usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
-    if "level" in options:
-        usual |= dict.fromkeys(("level_mm", "level_deg"), options.pop("level"))
-    if "salt_file" in options:
-        options["salt_file"] = read_salt(options["salt_file"])
-    return TrialSettings(**(usual | in_python(options)))
+    if "noise_level" in options:
+        usual |= dict.fromkeys(("noise_mm", "noise_deg"), options.pop("noise_level"))
+    if "secret_seed_file" in options:
+        options["secret_seed_file"] = read_secret_seed(options["secret_seed_file"])
+    return TrialConfig(**(usual | in_python(options)))
 
 
 def looked_at(
@@ -133,14 +133,14 @@ def _watched(request: Request) -> Observation:
     return look(spec, scene, simulated)
 
 
-def look(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
+def look(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
     """The demonstration of a trial through its eye."""
-    return observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
+    return observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.secret_seed)
 
 
 def _refuse_contradictions(request: Request, options: Mapping[str, Any]) -> None:
-    may_be = options.get("relations") in ("given", *RECOGNISED)
-    drawn = [name for name in _DRAWN if name in options and not (name == "relations" and may_be)]
+    may_be = options.get("contact_source") in ("given", *DETECTED)
+    drawn = [name for name in _DRAWN if name in options and not (name == "contact_source" and may_be)]
     saved = ["save_observation"] if request.save_observation is not None else []
     for name in (*drawn, *saved):
         raise InputError(
@@ -152,7 +152,7 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def run_request(request: Request, show: Show | None = None) -> Row:
+def run_request(request: Request, show: Show | None = None) -> TrialRecord:
     """Run the trial, or the replay of a measured observation, that was asked for.
 
     Args:
@@ -165,7 +165,7 @@ def run_request(request: Request, show: Show | None = None) -> Row:
     return run_settings(request, spec, show)
 
 
-def run_settings(request: Request, spec: TrialSettings, show: Show | None = None) -> Row:
+def run_settings(request: Request, spec: TrialConfig, show: Show | None = None) -> TrialRecord:
     """Run the trial of these settings; the request says what to read and to write.
 
     Args:
@@ -190,19 +190,19 @@ def run_settings(request: Request, spec: TrialSettings, show: Show | None = None
     else:
         simulated = demonstration_of(spec, scene)
         row = _drawn(request, spec, scene, simulated, watch)
-        if track is not None and row["sim_seconds"] is not None:
+        if track is not None and row["sim_time_s"] is not None:
             seen = look(spec, scene, simulated)
-    if track is None or seen is None or row["sim_seconds"] is None:
+    if track is None or seen is None or row["sim_time_s"] is None:
         return row
-    story = trial_story(spec, scene, seen, track, row, simulated)
+    rollout = trial_story(spec, scene, seen, track, row, simulated)
     if request.video:
-        write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
+        write_film(scene.scenario.assembly, rollout.assembled, rollout.chapters, request.video)
     if show is not None:
-        show(story)
+        show(rollout)
     return row
 
 
-def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
+def checked_request(request: Request) -> tuple[Scenario, TrialConfig]:
     """The scenario and the settings of a request.
 
     Raises:
@@ -215,7 +215,7 @@ def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
     return scenario, settings
 
 
-def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
+def lost_request(request: Request, spec: TrialConfig, scenario: Scenario, code: str) -> TrialRecord:
     """The row of a trial whose process died or took too long.
 
     Args:
@@ -226,10 +226,12 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
     if request.observation is None:
         return row
     text = read_text(request.observation, "observation file")
-    return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
+    return row | {"config_hash": config_hash(spec, content, text), **MEASURED}
 
 
-def _drawn(request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any) -> Row:
+def _drawn(
+    request: Request, spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, watch: Any
+) -> TrialRecord:
     if request.save_observation:
         from apo_bench.formats.json_forms import observation_form, write_form
 

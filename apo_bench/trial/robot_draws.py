@@ -25,7 +25,7 @@ _PICK = 1
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False) -> tuple[Poses, ...]:
+def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -> tuple[Poses, ...]:
     """Every part when a robot with these errors puts one, for each step of the schedule that does: the others rest.
 
     What is pushed in level floats on its way, as it is carried out.
@@ -35,7 +35,7 @@ def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False)
     """
     resting = plan.start
     states = list[Poses]()
-    for move in moves(plan, scene, searches):
+    for move in moves(plan, scene, spiral):
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]

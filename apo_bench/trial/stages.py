@@ -19,11 +19,20 @@ from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.planning.prediction.failure import ARM_CODES, predict
-from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
+from apo_bench.records import (
+    DEPTH_CAMERA,
+    NO_ROBOT_ERROR,
+    SETTINGS,
+    Predicted,
+    SecretSeed,
+    TrialConfig,
+    robot_sigmas,
+    sentence,
+)
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution import ReplayCache, replay
-from apo_bench.simulation.execution.probing.feeling import Feels
+from apo_bench.simulation.execution.probing.feeling import ProbingConfig
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene, build_scene
@@ -32,7 +41,9 @@ if TYPE_CHECKING:
     from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(12)
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE, TV, REOBSERVE, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(
+    12
+)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing; four are of
 what is wrong with the robot, the last one is the noise of the sensor at its wrist."""
 
@@ -57,50 +68,59 @@ class Attempt:
     verdict: Verdict
 
 
-def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generator:
+def stream(seed: int, which: int, secret_seed: SecretSeed | None = None) -> np.random.Generator:
     """The random numbers of one stage of one trial; nothing but seed, stage and salt is in the key."""
-    return np.random.default_rng(stream_key(seed, which, salt))
+    return np.random.default_rng(stream_key(seed, which, secret_seed))
 
 
-def stream_key(seed: int, which: int, salt: Salt | None = None) -> tuple[int, ...]:
+def stream_key(seed: int, which: int, secret_seed: SecretSeed | None = None) -> tuple[int, ...]:
     """What `numpy.random.default_rng` makes the random numbers of a stage of."""
-    return (seed, which, *(salt.words(seed, which) if salt else ()))
+    return (seed, which, *(secret_seed.words(seed, which) if secret_seed else ()))
 
 
 def simulate_demonstration(
-    scene: Scene, careless: float, seed: int, eye: str = "noise", salt: Salt | None = None
+    scene: Scene, human_error_scale: float, seed: int, pose_source: str = "noise", secret_seed: SecretSeed | None = None
 ) -> SimulatedDemonstration:
     """Draw the truth of a trial and let the human demonstrate it; the eye `range` takes images of that."""
-    layout = draw_layout(scene.scenario, stream(seed, LAYOUT, salt), scene.clearance_mm)
-    rng = stream(seed, DEMONSTRATION, salt)
-    if eye != RANGE:
-        return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng))
+    layout = draw_layout(scene.scenario, stream(seed, LAYOUT, secret_seed), scene.clearance_mm)
+    rng = stream(seed, DEMONSTRATION, secret_seed)
+    if pose_source != DEPTH_CAMERA:
+        return SimulatedDemonstration(layout, demonstrate(scene, layout, human_error_scale, rng))
     from apo_bench.perception.depth_camera.surface import load_small_gicp
     from apo_bench.simulation.sensor.watch import DemonstrationCamera
 
     load_small_gicp()
-    watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt))
-    return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
+    watcher = DemonstrationCamera(scene.shown, stream(seed, TV, secret_seed))
+    return SimulatedDemonstration(
+        layout, demonstrate(scene, layout, human_error_scale, rng, watcher), watcher.watched()
+    )
 
 
-def demonstration_of(settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
+def demonstration_of(settings: TrialConfig, scene: Scene) -> SimulatedDemonstration:
     """The demonstration of a trial.
 
     Args:
         scene: As compiled for these settings.
     """
-    return simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+    return simulate_demonstration(
+        scene, settings.human_error_scale, settings.seed, settings.pose_source, settings.secret_seed
+    )
 
 
 def watch_again(
-    scene: Scene, simulated: SimulatedDemonstration, careless: float, seed: int, salt: Salt | None, watch: Any
+    scene: Scene,
+    simulated: SimulatedDemonstration,
+    human_error_scale: float,
+    seed: int,
+    secret_seed: SecretSeed | None,
+    watch: Any,
 ) -> None:
     """Let the human demonstrate once more, the same, before somebody who looks on."""
-    demonstrate(scene, simulated.layout, careless, stream(seed, DEMONSTRATION, salt), watch)
+    demonstrate(scene, simulated.layout, human_error_scale, stream(seed, DEMONSTRATION, secret_seed), watch)
 
 
-def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: float) -> RangeSensor:
-    """The range finder that watched a demonstration, as a noise model; `level_mm` is the noise of a ray."""
+def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: float) -> RangeSensor:
+    """The range finder that watched a demonstration, as a noise model; `noise_mm` is the noise of a ray."""
     from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.rays import ModelRays
 
@@ -108,22 +128,22 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: floa
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
     camera = simulated.images
-    return RangeSensor(camera.finder, camera.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
+    return RangeSensor(camera.finder, camera.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
 
 
 def observe_demonstration(
-    simulated: SimulatedDemonstration, noise: Noise, seed: int, salt: Salt | None = None
+    simulated: SimulatedDemonstration, noise: Noise, seed: int, secret_seed: SecretSeed | None = None
 ) -> Observation:
     """What a noise model makes of the demonstration of a trial."""
-    return observe(simulated.demonstration, noise, stream(seed, OBSERVATION, salt))
+    return observe(simulated.demonstration, noise, stream(seed, OBSERVATION, secret_seed))
 
 
-def looks_at(
+def reobservations_of(
     simulated: SimulatedDemonstration,
     noise: Noise,
     seed: int,
     allowed: int,
-    salt: Salt | None = None,
+    secret_seed: SecretSeed | None = None,
     assembly: Assembly | None = None,
 ) -> Looks:
     """Looks at the demonstration of a trial that was observed once.
@@ -131,8 +151,8 @@ def looks_at(
     Args:
         assembly: As in `Looks`.
     """
-    first = stream(seed, OBSERVATION, salt)
-    return Looks(simulated.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly, first)
+    first = stream(seed, OBSERVATION, secret_seed)
+    return Looks(simulated.demonstration, noise, stream(seed, REOBSERVE, secret_seed), allowed, assembly, first)
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:
@@ -149,14 +169,14 @@ def observation_failure(observation: Observation) -> Outcome | None:
     return Outcome("observe", "not_seen", k, sentence("not_seen", operation=k))
 
 
-def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predicted:
+def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> Predicted:
     """What plan and arm say before it is carried out, as it stands in a row: operations from 1, mm.
 
     Args:
         plan: With the contacts that the planner was given; which are the true ones is not known here.
         searches: As in `replay_and_judge`.
     """
-    arm = arm_moves(plan, scene, searches)
+    arm = arm_moves(plan, scene, spiral)
     prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
     predicted: Predicted = {
@@ -168,7 +188,7 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
     return predicted if prediction.code not in ARM_CODES else {**predicted, "sentence": prediction.sentence}
 
 
-def draw_robot_error(name: str, scene: Scene, seed: int, salt: Salt | None = None) -> RobotError | None:
+def draw_robot_error(name: str, scene: Scene, seed: int, secret_seed: SecretSeed | None = None) -> RobotError | None:
     """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
 
     Args:
@@ -176,7 +196,7 @@ def draw_robot_error(name: str, scene: Scene, seed: int, salt: Salt | None = Non
     """
     if name == NO_ROBOT_ERROR:
         return None
-    return robot_error_of(name, scene, lambda which, shape: stream(seed, which, salt).standard_normal(shape))
+    return robot_error_of(name, scene, lambda which, shape: stream(seed, which, secret_seed).standard_normal(shape))
 
 
 def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...]], Array]) -> RobotError:
@@ -213,10 +233,10 @@ def replay_and_judge(
     watch: Any = None,
     fidelity: str = "full",
     cache: ReplayCache | None = None,
-    searches: bool = False,
+    spiral: bool = False,
     most_s: float = math.inf,
     error: RobotError | None = None,
-    feels: Feels | None = None,
+    probing: ProbingConfig | None = None,
 ) -> Attempt:
     """Replay a plan and judge what was reached.
 
@@ -235,10 +255,10 @@ def replay_and_judge(
         watch,
         fidelity=fidelity,
         cache=cache,
-        searches=searches,
+        spiral=spiral,
         most_s=most_s,
         error=error,
-        feels=feels,
+        probing=probing,
     )
     return Attempt(result, judge(scene.scenario.assembly, result.reached, reference, scene.criteria))
 
@@ -257,7 +277,7 @@ def trial_outcome(attempt: Attempt) -> Outcome:
 _SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
 
 
-def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene:
+def scene_of(settings: TrialConfig, scenario: Scenario | None = None) -> Scene:
     """Compile the scene of a trial.
 
     Args:
@@ -270,6 +290,6 @@ def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene
     return build_scene(loaded, **{name: getattr(settings, name) for name in _SHAPING})
 
 
-def scene_key(settings: TrialSettings) -> tuple[Any, ...]:
+def scene_key(settings: TrialConfig) -> tuple[Any, ...]:
     """Equal where the same scene serves."""
     return (settings.scenario, *(getattr(settings, name) for name in _SHAPING))

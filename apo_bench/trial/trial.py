@@ -9,33 +9,34 @@ from typing import Any, cast
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.correction.calibration import UNSTATED, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, believe, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.looking import Looks
-from apo_bench.perception.observation.noise import Level, Noise, make_noise
-from apo_bench.perception.observation.relations import make_relations, with_relations
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
+from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.records import (
-    RANGE,
-    RECOGNISED,
-    USUAL_WRENCH,
+    DEPTH_CAMERA,
+    DETECTED,
+    USUAL_FT_SENSOR,
     Predicted,
-    Row,
-    TrialSettings,
-    knows_relations,
+    TrialConfig,
+    TrialRecord,
+    assumed_error,
     knows_truth,
-    parsed,
+    parse_method,
     robot_sigmas,
-    told_error,
+    uses_contacts,
 )
 from apo_bench.records.run.validation import unwritable
 from apo_bench.scenario import scenario_names
 from apo_bench.simulation.execution import ReplayCache
-from apo_bench.simulation.execution.probing.feeling import ACTS, Feels
+from apo_bench.simulation.execution.probing.feeling import ACTS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
+from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.outcome_columns import (
     confidence_columns,
     head,
@@ -45,19 +46,18 @@ from apo_bench.trial.outcome_columns import (
     result,
 )
 from apo_bench.trial.planning import apply_method, nominal_where_seen
-from apo_bench.trial.promise import abstained, promised_success
-from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
+from apo_bench.trial.predicted_success import abstained, predict_success
 from apo_bench.trial.stages import (
-    RELATIONS,
+    CONTACT_SOURCE,
     WRENCH,
     SimulatedDemonstration,
     demonstration_failure,
     demonstration_of,
     draw_robot_error,
-    looks_at,
     observe_demonstration,
     predicted_outcome,
     range_sensor,
+    reobservations_of,
     replay_and_judge,
     scene_of,
     stream,
@@ -66,14 +66,14 @@ from apo_bench.trial.stages import (
 )
 
 
-def feels_of(
+def probing_config(
     plan: Plan,
     scene: Scene,
     stated: str | None,
     seed: tuple[int, ...],
-    wrench: str = USUAL_WRENCH,
+    ft_sensor: str = USUAL_FT_SENSOR,
     acts: tuple[str, ...] = ACTS,
-) -> Feels:
+) -> ProbingConfig:
     """A robot that is told how wrong it may be, and finds out how wrong it is.
 
     Args:
@@ -85,18 +85,18 @@ def feels_of(
     Raises:
         InputError: An unknown kind of error, or a number that is not allowed.
     """
-    sigmas = UNSTATED if stated is None else robot_sigmas(stated)
+    sigmas = UNKNOWN if stated is None else robot_sigmas(stated)
     belief = believe(sigmas, len(scene.arm.joints), plan.goals[:, :3, 3].mean(axis=0))
-    return Feels(belief, slip_sigmas(sigmas), seed, wrench, acts)
+    return ProbingConfig(belief, slip_sigmas(sigmas), seed, ft_sensor, acts)
 
 
-MEASURED: Row = {"level": None, "level_deg": None, "careless": None, "noise": "measured"}
+MEASURED: TrialRecord = {"noise_mm": None, "noise_deg": None, "human_error_scale": None, "noise": "measured"}
 """What a row says of a trial that was not drawn."""
 
 
 @check_arguments
 def run_trial(
-    settings: TrialSettings,
+    settings: TrialConfig,
     scene: Scene | None = None,
     *,
     simulated: SimulatedDemonstration | None = None,
@@ -104,7 +104,7 @@ def run_trial(
     method: str | Callable[..., Any] | None = None,
     watch: Hooks | Callable[[Any], None] | None = None,
     cache: ReplayCache | None = None,
-) -> Row:
+) -> TrialRecord:
     """Run one trial.
 
     Args:
@@ -127,19 +127,23 @@ def run_trial(
     )
     simulated = simulated or demonstration_of(settings, scene)
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    first = head(settings, scene.scenario, spec_hash(settings, content))
+    first = head(settings, scene.scenario, config_hash(settings, content))
     first |= {"demonstration": simulated.demonstration.code}
     if simulated.demonstration.code != "ok":
         return first | result(demonstration_failure(simulated.demonstration), success=None)
     truth = simulated.layout.goals
     noise = noise_of(settings, scene, simulated)
-    observation = observe_demonstration(simulated, noise, settings.seed, settings.salt)
+    observation = observe_demonstration(simulated, noise, settings.seed, settings.secret_seed)
     corrector_input = _corrector_input(settings, observation, truth)
-    look = looks_at(simulated, noise, settings.seed, settings.looks, settings.salt, corrector_input.assembly)
+    look = reobservations_of(
+        simulated, noise, settings.seed, settings.max_reobservations, settings.secret_seed, corrector_input.assembly
+    )
     return first | _row(settings, scene, observation, corrector_input, truth, truth, method, watch, cache, look)
 
 
-def trial_row(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any) -> Row:
+def trial_row(
+    spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any
+) -> TrialRecord:
     """The row of a trial, also of one whose corrector misbehaved.
 
     What code of somebody's own returned may be what no row can hold; that is its failure too.
@@ -161,21 +165,21 @@ def trial_row(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstrati
     return misbehaved(spec, content, simulated.demonstration.code, why)
 
 
-def noise_of(settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
+def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
     """The noise model of a trial, or the range finder that watched its demonstration."""
-    if settings.eye == RANGE:
-        return range_sensor(scene, simulated, settings.level_mm)
-    return make_noise(settings.noise, Level(settings.level_mm, settings.level_deg))
+    if settings.pose_source == DEPTH_CAMERA:
+        return range_sensor(scene, simulated, settings.noise_mm)
+    return make_noise(settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
 
 
 def run_measured(
-    settings: TrialSettings,
+    settings: TrialConfig,
     scene: Scene,
     observation: Observation,
     text: str,
     *,
     watch: Any = None,
-) -> Row:
+) -> TrialRecord:
     """Replay an observation that came from a file: its truth is not known.
 
     The judge compares overlaps with those of the scenario's nominal goals, put where the first part was seen; level,
@@ -193,14 +197,14 @@ def run_measured(
         "or paper.",
     )
     content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    first = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
+    first = head(settings, scene.scenario, config_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)
     corrector_input = _corrector_input(settings, observation, None)
     return first | _row(settings, scene, observation, corrector_input, reference, None, None, watch, None, None)
 
 
 def _row(
-    settings: TrialSettings,
+    settings: TrialConfig,
     scene: Scene,
     observation: Observation,
     corrector_input: Observation,
@@ -210,7 +214,7 @@ def _row(
     watch: Any,
     cache: ReplayCache | None,
     look: Looks | None,
-) -> Row:
+) -> TrialRecord:
     """What the method made of the observation, and what came of its plan.
 
     Args:
@@ -218,78 +222,80 @@ def _row(
         reference: (n, 4, 4) goals that are right for the judge.
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
-    planned = apply_method(method or parsed(settings.method).plan, corrector_input, truth, look, scene)
+    planned = apply_method(method or parse_method(settings.method).corrector, corrector_input, truth, look, scene)
     if planned.plan is None:
         assert planned.failure is not None
         row = result(planned.failure, success=False)
     else:
-        predicted, promised = _say_before(settings, scene, corrector_input, planned.plan, planned.correction)
+        predicted, predicted_success = _say_before(settings, scene, corrector_input, planned.plan, planned.correction)
         # What is carried out are goals; which contacts they make, the truth says.
         plan = replace(planned.plan, assembly=observation.assembly)
-        row = _carry_out(settings, scene, promised, plan, reference, truth, watch, cache)
-        row |= {"predicted": predicted, "promised": promised}
+        row = _carry_out(settings, scene, predicted_success, plan, reference, truth, watch, cache)
+        row |= {"failure_prediction": predicted, "predicted_success": predicted_success}
     row |= method_columns(planned) | confidence_columns(planned, observation, corrector_input, truth)
     if planned.correction is not None:
-        row |= {"seen_again": look.seen_again if look else 0}
-    if knows_relations(settings.method):
-        row |= cast(Row, count_contacts(observation.assembly, corrector_input.assembly))
+        row |= {"reobservations": look.reobservations if look else 0}
+    if uses_contacts(settings.method):
+        row |= cast(TrialRecord, count_contacts(observation.assembly, corrector_input.assembly))
     return row
 
 
-def _corrector_input(settings: TrialSettings, observation: Observation, truth: Array | None) -> Observation:
+def _corrector_input(settings: TrialConfig, observation: Observation, truth: Array | None) -> Observation:
     """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
-    if not knows_relations(settings.method):
+    if not uses_contacts(settings.method):
         return observation
-    if settings.relations in RECOGNISED:
-        return with_recognised_contacts(observation, settings.relations)
+    if settings.contact_source in DETECTED:
+        return with_recognised_contacts(observation, settings.contact_source)
     if truth is None:
         return observation
-    rng = stream(settings.seed, RELATIONS, settings.salt)
-    return with_relations(observation, make_relations(settings.relations), truth, rng)
+    rng = stream(settings.seed, CONTACT_SOURCE, settings.secret_seed)
+    return with_contacts(observation, make_contacts(settings.contact_source), truth, rng)
 
 
 def _say_before(
-    settings: TrialSettings, scene: Scene, given: Observation, plan: Plan, correction: Correction | None
+    settings: TrialConfig, scene: Scene, given: Observation, plan: Plan, correction: Correction | None
 ) -> tuple[Predicted, float]:
     """What a plan says of itself before anything moves: what will fail, and how likely it succeeds.
 
     Args:
         given: What the planner was given; the plan has the same contacts.
     """
-    _, searches, by_touch = parsed(settings.method)
-    promised = promised_success(plan, given, correction, scene, settings.robot_error, searches, by_touch)
-    return predicted_outcome(plan, scene, searches), promised
+    _, spiral, probe = parse_method(settings.method)
+    predicted_success = predict_success(plan, given, correction, scene, settings.robot_error, spiral, probe)
+    return predicted_outcome(plan, scene, spiral), predicted_success
 
 
 def _carry_out(
-    settings: TrialSettings,
+    settings: TrialConfig,
     scene: Scene,
-    promised: float,
+    predicted_success: float,
     plan: Plan,
     reference: Array,
     truth: Array | None,
     watch: Any,
     cache: ReplayCache | None,
-) -> Row:
+) -> TrialRecord:
     """What came of a plan, if it promises enough.
 
     Args:
         plan: With the right contacts.
     """
-    if promised < settings.abstain:
-        return result(abstained(promised, settings.abstain), success=False)
-    _, searches, by_touch = parsed(settings.method)
-    error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
-    feels = _feels(settings, plan, scene) if by_touch else None
+    if predicted_success < settings.min_predicted_success:
+        return result(abstained(predicted_success, settings.min_predicted_success), success=False)
+    _, spiral, probe = parse_method(settings.method)
+    error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.secret_seed)
+    probing = _feels(settings, plan, scene) if probe else None
     attempt = replay_and_judge(
-        plan, scene, reference, watch, settings.fidelity, cache, searches, error=error, feels=feels
+        plan, scene, reference, watch, settings.fidelity, cache, spiral, error=error, probing=probing
     )
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
-    driven: Row = {"joint_control": scene.arm.control}
+    driven: TrialRecord = {"joint_control": scene.arm.control}
     return end | driven | replay_columns(attempt, plan, truth)
 
 
-def _feels(settings: TrialSettings, plan: Plan, scene: Scene) -> Feels:
+def _feels(settings: TrialConfig, plan: Plan, scene: Scene) -> ProbingConfig:
     """How the robot feels: it is told standard deviations, never what was drawn."""
-    told = told_error(settings.stated_error, settings.robot_error)
-    return feels_of(plan, scene, told, stream_key(settings.seed, WRENCH, settings.salt), settings.wrench)
+    told = assumed_error(settings.assumed_robot_error, settings.robot_error)
+    return probing_config(
+        plan, scene, told, stream_key(settings.seed, WRENCH, settings.secret_seed), settings.ft_sensor
+    )

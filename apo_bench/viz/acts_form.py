@@ -13,7 +13,7 @@ from apo_bench.assembly import Plan
 from apo_bench.formats.json_forms import TO_MM_DEG
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.records import WrenchNoise, wrench_noise
+from apo_bench.records import FtNoise, ft_noise
 from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search
 from apo_bench.simulation.execution.probing import touching
 from apo_bench.simulation.execution.probing.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
@@ -38,7 +38,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
     Raises:
         InputError: An unknown sensor.
     """
-    noise = wrench_noise(sensor)
+    noise = ft_noise(sensor)
     felt = felt_noise(noise, low_pass_part())
     guard = touch_guard(felt.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
@@ -89,7 +89,7 @@ def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
     }
 
 
-def _step(move: Move, scene: Scene, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any]:
+def _step(move: Move, scene: Scene, frames: RobotFrames, felt: FtNoise) -> dict[str, Any]:
     t = move.transfer
     first = t.grips[0]
     return {
@@ -113,7 +113,7 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
     }
 
 
-def _laid(t: Transfer, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any] | None:
+def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | None:
     """None where the sensor could not tell lying."""
     averaged = touching.averaged_s(t.flush, felt)
     if averaged > touching.LONGEST_S:

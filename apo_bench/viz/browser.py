@@ -16,7 +16,7 @@ from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
 from apo_bench.simulation.film.window import PICTURE_S
 from apo_bench.simulation.scene import initial_state
-from apo_bench.trial.story import Story
+from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.stepping import Cursor
 
 HOST = "127.0.0.1"
@@ -38,7 +38,9 @@ def no_browser() -> str:
     return ""
 
 
-def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False) -> None:
+def serve_story(
+    rollout: Rollout, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False
+) -> None:
     """Serve a story until `ends` says so, or Ctrl-C.
 
     Args:
@@ -47,7 +49,7 @@ def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Calla
     Raises:
         InputError: The port is taken or not allowed.
     """
-    page = Page(story, port)
+    page = Page(rollout, port)
     try:
         say(f"Open {page.address} in a browser on this machine; Ctrl-C ends it.")
         before = time.monotonic()
@@ -64,15 +66,15 @@ def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Calla
 class Page:
     """What one browser, or several, see: they share one place in the story."""
 
-    def __init__(self, story: Story, port: int) -> None:
-        self.cursor = Cursor(story)
+    def __init__(self, rollout: Rollout, port: int) -> None:
+        self.cursor = Cursor(rollout)
         self._asked = deque[str | int]()
-        self._data = initial_state(story.scene.work, story.chapters[0].start)
+        self._data = initial_state(rollout.scene.work, rollout.chapters[0].start)
         self._server = _server(port)
         self._drawn: object = None
         self._shown: dict[tuple[ShapeKind, int], Any] = {}
         self.address = f"http://{HOST}:{self._server.get_port()}"
-        self._aim_camera(story)
+        self._aim_camera(rollout)
         self._add_controls()
 
     def close(self) -> None:
@@ -93,7 +95,7 @@ class Page:
         snapshot = self.cursor.snapshot()
         count = Counter[ShapeKind]()
         with self._server.atomic():
-            for kind, at in shapes_of(self.cursor.story.scene, self._data, snapshot):
+            for kind, at in shapes_of(self.cursor.rollout.scene, self._data, snapshot):
                 handle = self._handle(kind, count[kind])
                 count[kind] += 1
                 if not np.array_equal(at, (*handle.position, *handle.wxyz)):
@@ -113,7 +115,7 @@ class Page:
             if kind.label:
                 handle = self._server.scene.add_label(name, kind.label, anchor="center-center")
             else:
-                mesh = surface(self.cursor.story.scene.work.model, kind)
+                mesh = surface(self.cursor.rollout.scene.work.model, kind)
                 handle = self._server.scene.add_mesh_simple(
                     name,
                     mesh.vertices.astype(np.float32),
@@ -125,10 +127,10 @@ class Page:
             self._shown[kind, number] = handle
         return self._shown[kind, number]
 
-    def _aim_camera(self, story: Story) -> None:
+    def _aim_camera(self, rollout: Rollout) -> None:
         self._server.scene.set_up_direction("+z")
         self._server.scene.configure_default_lights(cast_shadow=False)
-        at, far = frame_parts(story.scene.scenario.assembly, [story.assembled])
+        at, far = frame_parts(rollout.scene.scenario.assembly, [rollout.assembled])
         azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
         # where the camera looks, as a unit vector
         ahead = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]

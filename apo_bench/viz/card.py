@@ -11,7 +11,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import listed_words
 from apo_bench.judging.verdict import fixtures
 from apo_bench.planning.insertion.states import classify
-from apo_bench.scenario import NOTHING_M, Carelessness, Scenario, Turn, spread_error
+from apo_bench.scenario import NOTHING_M, HumanError, Scenario, Turn, spread_error
 
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVEL = 0.01
@@ -108,18 +108,18 @@ def _way(scenario: Scenario, arc: Arc) -> str:
 
 
 def _carelessness(scenario: Scenario) -> str:
-    how = scenario.careless
+    how = scenario.human_error
     if how is None:
         return "No carelessness is drawn."
     main = scenario.assembly.operations[how.operation].main
     return (
-        f"At `careless` 1, operation {how.operation + 1} puts {main} {_span(how.low_m, how.high_m)} mm aside along "
+        f"At `human_error_scale` 1, operation {how.operation + 1} puts {main} {_span(how.low_m, how.high_m)} mm aside along "
         f"{_axis(how.axis)}, to either side{_followers(scenario, how)}; "
         "what is wrong is mended at the last operation, unseen."
     )
 
 
-def _followers(scenario: Scenario, how: Carelessness) -> str:
+def _followers(scenario: Scenario, how: HumanError) -> str:
     """The operations that an error leads astray, being guided by a displaced face."""
     offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
     led = [k for k in np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M) if k != how.operation]
@@ -154,7 +154,7 @@ def _success(scenario: Scenario) -> Iterator[str]:
         f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
         f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
         f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
-        f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; "
+        f"another, no parts that touch slid against each other by more than {t.displaced_mm:g} mm since they were put; "
         f"all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s.": True,
         "The play of all faces of two parts together leaves some of them more, so they may be farther apart: "
         f"{wider}.": wider,
@@ -163,7 +163,7 @@ def _success(scenario: Scenario) -> Iterator[str]:
         "axis.": is_round,
         f"Where {listed_words(away)} ends is free: it is a fixture, used and put away.": away,
         "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
-        f"pushed on the way, nor a corner of one more than {t.pushed_mm:g} mm from where it was put."
+        f"pushed on the way, nor a corner of one more than {t.displaced_mm:g} mm from where it was put."
         + " Here only that is a success."
         * (scenario.success_means != "assembled"): True,
         f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same "

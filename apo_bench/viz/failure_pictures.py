@@ -17,7 +17,7 @@ from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.io import each_line
-from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
+from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, record_key, settings_of
 from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
 
@@ -33,10 +33,10 @@ _SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sente
 
 
 def failure_pictures(
-    chosen: Sequence[Row],
+    chosen: Sequence[TrialRecord],
     folder: Path,
     files: Files | None = None,
-    salt: Salt | None = None,
+    secret_seed: SecretSeed | None = None,
     *,
     trust_code: bool = False,
 ) -> tuple[list[FailurePicture], list[str]]:
@@ -54,7 +54,7 @@ def failure_pictures(
             missed.append(left_out([row]))
             continue
         try:
-            pictures.append(_picture_of(row, folder, files or {}, salt))
+            pictures.append(_picture_of(row, folder, files or {}, secret_seed))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
@@ -62,7 +62,7 @@ def failure_pictures(
     return pictures, list(dict.fromkeys(missed))
 
 
-def _picture_of(row: Row, folder: Path, files: Files, salt: Salt | None) -> FailurePicture:
+def _picture_of(row: TrialRecord, folder: Path, files: Files, secret_seed: SecretSeed | None) -> FailurePicture:
     import imageio.v3 as iio
 
     from apo_bench.scenario.file import is_named
@@ -72,7 +72,7 @@ def _picture_of(row: Row, folder: Path, files: Files, salt: Salt | None) -> Fail
 
     name = row["scenario"]
     require(name in files or is_named(name), f"run.json says no file of the scenario '{name}'")
-    spec = replace(settings_of(row, files.get(name, name)), salt=salt)
+    spec = replace(settings_of(row, files.get(name, name)), secret_seed=secret_seed)
     scene = scene_of(spec)
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
     changed = why_not_again(row, spec)
@@ -90,33 +90,33 @@ def _picture_of(row: Row, folder: Path, files: Files, salt: Salt | None) -> Fail
     return FailurePicture(row, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), f"{how}{at}")
 
 
-def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
+def _whole_row(folder: Path, row: TrialRecord) -> Mapping[str, Any]:
     """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
-    wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
+    wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["config_hash"]).encode())
     path = folder / "trials.jsonl"
     for number, line in each_line(path, "table of trials"):
         if all(part in line for part in wanted):
             whole = row_of(line, f"{path}, line {number}")
-            if row_key(whole) == row_key(row):
+            if record_key(whole) == record_key(row):
                 return whole
     return {}
 
 
-def _draw_again(row: Row, spec: TrialSettings) -> Any:
+def _draw_again(row: TrialRecord, spec: TrialConfig) -> Any:
     """The last moment of the replay, with the arm; None if it ended in another way."""
     from apo_bench.simulation.scene.render import picture_with_arm
     from apo_bench.viz.again import run_again
 
-    now, story = run_again(spec)
-    if story is None or any(now.get(name) != row.get(name) for name in _SAME):
+    now, rollout = run_again(spec)
+    if rollout is None or any(now.get(name) != row.get(name) for name in _SAME):
         return None
     poses = _poses(now["reached"])
-    last = story.chapters[-1].moments[-1].qpos
-    camera = _camera(story.scene, row, poses)
-    return picture_with_arm(story.scene, poses, last, *_SIZE, camera, _mark(row, story.scene, poses))
+    last = rollout.chapters[-1].moments[-1].qpos
+    camera = _camera(rollout.scene, row, poses)
+    return picture_with_arm(rollout.scene, poses, last, *_SIZE, camera, _mark(row, rollout.scene, poses))
 
 
-def _failed_contact(row: Row, scene: Any) -> Contact | None:
+def _failed_contact(row: TrialRecord, scene: Any) -> Contact | None:
     """The contact that the sentence of a failure names; else the first one of an operation that was stopped."""
     operations = scene.scenario.assembly.operations
     sentence = f"{row.get('sentence') or ''} "
@@ -130,7 +130,7 @@ def _failed_contact(row: Row, scene: Any) -> Contact | None:
     return None
 
 
-def _mark(row: Row, scene: Any, poses: Poses) -> Any:
+def _mark(row: TrialRecord, scene: Any, poses: Poses) -> Any:
     """An arrow from above to the middle of the face that the contact is made with; where that is the ground, to the
     face that should lie on it."""
     from apo_bench.simulation.scene.marks import Marks, ShiftArrows
@@ -149,7 +149,7 @@ def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
     return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in (reached or {}).items()}
 
 
-def _camera(scene: Any, row: Row, poses: Poses) -> Any:
+def _camera(scene: Any, row: TrialRecord, poses: Poses) -> Any:
     """One that sees the parts of the operation that failed, else all that were assembled."""
     from apo_bench.simulation.film.framing import frame_parts
     from apo_bench.simulation.scene.render import camera_view

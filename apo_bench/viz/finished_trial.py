@@ -5,15 +5,15 @@ from pathlib import Path
 
 from apo_bench.errors import InputError
 from apo_bench.io import each_line
-from apo_bench.records import Row, read_salt, settings_of
+from apo_bench.records import TrialRecord, read_secret_seed, settings_of
 from apo_bench.records.run.replay_command import own_code
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.validation import row_of
-from apo_bench.trial.story import Story
+from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.again import run_again, why_not_again
 
 
-def trial_again(folder: Path, number: int | None, salt_file: Path | None = None) -> tuple[Row, Story]:
+def trial_again(folder: Path, number: int | None, secret_seed_file: Path | None = None) -> tuple[TrialRecord, Rollout]:
     """A trial of a sweep and its row.
 
     Args:
@@ -32,24 +32,24 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
         )
     name = row["scenario"]
     spec = settings_of(row, scenario_files(read_run(folder)).get(name, name))
-    if salt_file is not None:
-        spec = replace(spec, salt=read_salt(salt_file))
+    if secret_seed_file is not None:
+        spec = replace(spec, secret_seed=read_secret_seed(secret_seed_file))
     if changed := why_not_again(row, spec):
         raise RuntimeError(f"trial {number} of {folder} cannot be run again: {changed}.")
-    again, story = run_again(spec)
-    if story is None:
+    again, rollout = run_again(spec)
+    if rollout is None:
         raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
-    return again, story
+    return again, rollout
 
 
-def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:
+def _chosen(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
     path = folder / "trials.jsonl"
     first = None
     k = 0
     for k, line in each_line(path, "table of trials"):
         if number in (None, k):
             row = row_of(line, f"{path}, line {k}")
-            if number is not None or (row["success"] is False and row["sim_seconds"] is not None):
+            if number is not None or (row["success"] is False and row["sim_time_s"] is not None):
                 return k, row
             first = first or (k, row)
     if first is None:

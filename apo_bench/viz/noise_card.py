@@ -10,7 +10,7 @@ from apo_bench.assembly import Demonstration, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.names import resolve
 from apo_bench.perception.observation.models import Camera, Facts
-from apo_bench.perception.observation.noise import FAILURES, NOISES, Level, make_noise
+from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import noise_path, presets, read_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.scenario.file import load_scenario
@@ -48,9 +48,9 @@ def find_facts(model: Any) -> Facts:
     return own if isinstance(own, Facts) else Facts(" ".join(title.split()), (), "", (), "")
 
 
-def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:
+def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Drawn:
     """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
-    noise = make_noise(model, level)
+    noise = make_noise(model, noise_level)
     demonstration = nominal_demonstration()
     camera = Camera()
     rng = np.random.default_rng(0)
@@ -83,12 +83,12 @@ def nominal_demonstration() -> Demonstration:
     return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
 
 
-def write_card(model: Any, level: Level, drawn: Drawn, heading: int = 1) -> str:
+def write_card(model: Any, noise_level: NoiseLevel, drawn: Drawn, heading: int = 1) -> str:
     """The card of a model in Markdown, with a table of the errors that were drawn."""
     about = describe_model(model, heading)
     if not len(drawn.errors):
         return f"{about}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
-    return "\n".join([about, f"{_describe_draws(model, drawn, level)}:", "", *_tabulate_errors(drawn), ""])
+    return "\n".join([about, f"{_describe_draws(model, drawn, noise_level)}:", "", *_tabulate_errors(drawn), ""])
 
 
 def describe_model(model: Any, heading: int = 1) -> str:
@@ -109,13 +109,13 @@ def describe_model(model: Any, heading: int = 1) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _describe_draws(model: Any, drawn: Drawn, level: Level) -> str:
+def _describe_draws(model: Any, drawn: Drawn, noise_level: NoiseLevel) -> str:
     """One sentence on what was drawn, without its full stop."""
     if find_facts(model).measured:
-        apart = f" in mm and {level.deg:g} times in deg" if level.deg != level.mm else ""
-        where = "as measured" if level == (1.0, 1.0) else f"{level.mm:g} times{apart} what was measured"
+        apart = f" in mm and {noise_level.deg:g} times in deg" if noise_level.deg != noise_level.mm else ""
+        where = "as measured" if noise_level == (1.0, 1.0) else f"{noise_level.mm:g} times{apart} what was measured"
     elif (isinstance(model, str) and model.partition(":")[0] in NOISES) or isinstance(_resolve_model(model), type):
-        where = f"at {level.mm:g} mm and {level.deg:g} deg"
+        where = f"at {noise_level.mm:g} mm and {noise_level.deg:g} deg"
     else:
         where = "at every level alike"
     missed = f"; {100 * drawn.missed:.1f} % were not seen" if drawn.missed else ""
@@ -140,4 +140,4 @@ def _table_line(name: str, cells: Iterable[str]) -> str:
 def _resolve_model(model: Any) -> Any:
     """What a name stands for: a class, or an object that no level changes, but what is measured at level 1."""
     known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
-    return make_noise(model, Level(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")
+    return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

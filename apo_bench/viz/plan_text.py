@@ -114,7 +114,7 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
                 "macros": [_macro(line.leaves, macro) for macro in line.leaves.departs]
                 + [_macro(line.comes, macro) for macro in line.comes.macros],
                 "from": line.came_from,
-                "until": {"relations": list(line.relations), "back_to": line.back_to or None} | goal,
+                "until": {"contact_source": list(line.relations), "back_to": line.back_to or None} | goal,
                 "guarded": felt.tolist(),
                 "position": position.tolist(),
                 "walls": across.tolist(),

@@ -5,7 +5,7 @@ from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.perception.detection.evidence import Recognised
-from apo_bench.trial.recognised_contacts import count_contacts
+from apo_bench.trial.detected_contacts import count_contacts
 from apo_bench.viz.tables import form_table
 
 _SCHEMA = "apo-bench/recognised/2"
@@ -31,13 +31,13 @@ def evidence_table(form: dict[str, Any]) -> Any:
 
 def difference_lines(form: dict[str, Any]) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
-    right = form["contacts_right"]
-    whole = right + form["contacts_missed"]
-    if right == whole and not form["contacts_false"]:
+    right = form["contacts_true_positive"]
+    whole = right + form["contacts_false_negative"]
+    if right == whole and not form["contacts_false_positive"]:
         return [f"all {whole} contacts of the scenario were recognised, and no other"]
     line = f"{right} of the {whole} contacts of the scenario were recognised"
     missed = [f"missed: {c['operation']}: {c['manipulated']} on {c['environment']}" for c in form["missed"]]
-    return [f"{line}, and {form['contacts_false']} that it does not have", *missed]
+    return [f"{line}, and {form['contacts_false_positive']} that it does not have", *missed]
 
 
 def confidence_lines(form: dict[str, Any]) -> list[str]:
@@ -69,7 +69,7 @@ def recognition_form(
     return {
         "schema": _SCHEMA,
         "scenario": name,
-        "relations": kind,
+        "contact_source": kind,
         "deviation_assumed": assumed,
         "contacts": [
             _contact_form(e.made, e.contact)

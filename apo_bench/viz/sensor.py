@@ -9,7 +9,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.depth_camera.follow import Event
 from apo_bench.perception.depth_camera.range_finder import RangeFinder
-from apo_bench.records import RANGE, check
+from apo_bench.records import DEPTH_CAMERA, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.rays import ModelRays
@@ -54,22 +54,22 @@ class SensorRun:
     """The parts as the range finder knows them."""
 
 
-def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> SensorRun:
+def run_sensor(scenario: str, noise_mm: float, seed: int, human_error_scale: float) -> SensorRun:
     """Let the human demonstrate, and watch: the same images and poses as in a trial with these settings.
 
     Raises:
         InputError: A setting that is not allowed.
         RuntimeError: The demonstration itself failed.
     """
-    check("level_mm", level_mm, RANGE)
-    check("careless", careless)
+    check("noise_mm", noise_mm, DEPTH_CAMERA)
+    check("human_error_scale", human_error_scale)
     check("seed", seed)
     scene = build_scene(load_scenario(scenario))
-    simulated = simulate_demonstration(scene, careless, seed, RANGE)
+    simulated = simulate_demonstration(scene, human_error_scale, seed, DEPTH_CAMERA)
     if simulated.demonstration.code != "ok":
         raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
     assert simulated.images is not None
-    sensor = range_sensor(scene, simulated, level_mm)
+    sensor = range_sensor(scene, simulated, noise_mm)
     images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
     events = sensor.events(simulated.demonstration, images)
     models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
@@ -87,15 +87,15 @@ def checked_view(view: int) -> int:
     return view - 1
 
 
-def sensor_form(run: SensorRun, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
+def sensor_form(run: SensorRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
     """Everything that `apo-bench eye` says, operations from 1; the error is that of the sensor, not the human's."""
     by_operation = {event.operation: event for event in run.events if event.operation is not None}
     return {
         "schema": _FORM,
         "scenario": run.name,
-        "level_mm": level_mm,
+        "noise_mm": noise_mm,
         "seed": seed,
-        "careless": careless,
+        "human_error_scale": human_error_scale,
         "firings_s": [round(t, 3) for t in run.watched.times_s],
         "operations": [
             {"operation": k + 1, "moves": list(operation.moves)} | _operation_form(by_operation.get(k), run, k)

@@ -11,7 +11,7 @@ from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.overlay import Color, Overlay, Snapshot
 from apo_bench.simulation.film.track import Chapter, FilmMoment, part_poses
-from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story
+from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout
 
 Faces = Literal["none", "this operation", "all"]
 FACES: tuple[Faces, ...] = ("none", "this operation", "all")
@@ -28,7 +28,7 @@ _COLORS: dict[str, tuple[str, Color]] = {
 class Cursor:
     """One moment of a story, whose chapters follow each other; methods move it, `snapshot` says what is there."""
 
-    story: Story
+    rollout: Rollout
     place: int = 0
     """The number of the moment, from 0, through all chapters."""
     playing: bool = False
@@ -37,7 +37,7 @@ class Cursor:
     _played_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.places = [(chapter, moment) for chapter in self.story.chapters for moment in chapter.moments]
+        self.places = [(chapter, moment) for chapter in self.rollout.chapters for moment in chapter.moments]
 
     @property
     def chapter(self) -> Chapter:
@@ -49,7 +49,7 @@ class Cursor:
 
     @property
     def _assembly(self) -> Assembly:
-        return self.story.scene.scenario.assembly
+        return self.rollout.scene.scenario.assembly
 
     @property
     def _is_last(self) -> bool:
@@ -95,22 +95,22 @@ class Cursor:
         ending = self.chapter.ending
         k = moment.doing.operation
         words = [f"{moment.time_s:.2f} s, {operation_words(self._assembly, moment)}"]
-        if ending and self.chapter.world is self.story.scene.work:
+        if ending and self.chapter.world is self.rollout.scene.work:
             words.append(f"force {moment.doing.force_n:.1f} N")
         if k is not None:
             words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
         if self.shows_goals:
-            words += [f"{_COLORS[name][0]}: {name}" for name in self.story.goals]
+            words += [f"{_COLORS[name][0]}: {name}" for name in self.rollout.goals]
         if ending and self._is_last:
             words.append(ending)
         return tuple(words)
 
     def _offsets(self, k: int) -> list[str]:
         """How far goals and the part are from the true goal of an operation, in its own frame."""
-        if AS_TRUE not in self.story.goals:
+        if AS_TRUE not in self.rollout.goals:
             return []
-        true = self.story.goals[AS_TRUE][k]
-        placed = {name: goals[k] for name, goals in self.story.goals.items() if name != AS_TRUE}
+        true = self.rollout.goals[AS_TRUE][k]
+        placed = {name: goals[k] for name, goals in self.rollout.goals.items() if name != AS_TRUE}
         placed["as it is now"] = part_poses(self.chapter, self.moment)[self._assembly.operations[k].main]
         lines = []
         for name, T in placed.items():
@@ -143,7 +143,7 @@ class Cursor:
         begun = self._assembly.first(k + 1)
         moved = {part for operation in begun.operations for part in operation.moves}
         overlays = []
-        for name, goals in self.story.goals.items():
+        for name, goals in self.rollout.goals.items():
             poses = placements(begun, self.chapter.start, goals[: k + 1])[-1]
             overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)

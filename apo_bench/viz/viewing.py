@@ -5,7 +5,7 @@ from typing import Literal
 
 from apo_bench.errors import InputError, require
 from apo_bench.simulation.film.window import no_window, step_in_window
-from apo_bench.trial.story import Story
+from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.browser import PORT, no_browser, serve_story
 from apo_bench.viz.stepping import Cursor
 
@@ -34,13 +34,13 @@ def choose_display(port: int | None) -> Display:
     return "browser"
 
 
-def view(story: Story, display: Display, port: int | None, say: Callable[[str], None]) -> None:
+def view(rollout: Rollout, display: Display, port: int | None, say: Callable[[str], None]) -> None:
     """Show it until a person closes the window, or Ctrl-C."""
     try:
         if display == "browser":
-            serve_story(story, PORT if port is None else port, say)
+            serve_story(rollout, PORT if port is None else port, say)
         else:
-            cursor = Cursor(story)
-            step_in_window(story.scene, story.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
+            cursor = Cursor(rollout)
+            step_in_window(rollout.scene, rollout.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
     except KeyboardInterrupt:
         say("")

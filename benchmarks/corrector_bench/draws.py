@@ -37,11 +37,11 @@ def factors(covariance: Array) -> Array:
     return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
 
 
-def draw(of: Problem, level: str, seed: int, per_part: bool = False) -> Draw:
+def draw(of: Problem, noise_level: str, seed: int, per_part: bool = False) -> Draw:
     """The observation of one seed: T_seen = T_true exp(xi), xi ~ N(0, covariance)."""
     rng = np.random.default_rng([seed, int(per_part)])
     truth = moved(of, rng)
-    sigma = scales(of, level, rng, per_part)
+    sigma = scales(of, noise_level, rng, per_part)
     twist = sigma * rng.standard_normal((of.n, 6))
     return Draw(truth, truth @ pose.exp(twist), sigma[:, :, None] ** 2 * np.eye(6))
 
@@ -60,9 +60,9 @@ def moved(of: Problem, rng: np.random.Generator) -> Array:
     return truth
 
 
-def scales(of: Problem, level: str, rng: np.random.Generator, per_part: bool = False) -> Array:
+def scales(of: Problem, noise_level: str, rng: np.random.Generator, per_part: bool = False) -> Array:
     """Standard deviation of every component, (n, 6), [m, rad]."""
-    mm, degrees = LEVELS[level]
+    mm, degrees = LEVELS[noise_level]
     one = np.array([1e-3 * mm] * 3 + [np.radians(degrees)] * 3)
     parts = [operation.main for operation in of.assembly.operations]
     low, high = np.log(FACTORS)

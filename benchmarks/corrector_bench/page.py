@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.corrector_bench.problems import FIGURES
-from benchmarks.corrector_bench.rows import Row, restored
+from benchmarks.corrector_bench.rows import TrialRecord, restored
 
 TIMES = ("P1", "P2", "P4", "P3")
 """Rows of the table of times, in its order."""
@@ -57,13 +57,13 @@ def page(document: Mapping[str, Any]) -> str:
     )
 
 
-def _missed(rows: Iterable[Row]) -> Iterable[str]:
+def _missed(rows: Iterable[TrialRecord]) -> Iterable[str]:
     for row in rows:
         measured = row.note or ("-" if row.value is None else f"{row.value:.3g}")
         yield f"- Missed, {row.problem}: {row.what}: {measured}, asked {row.target}"
 
 
-def _times(rows: Sequence[Row]) -> Iterable[str]:
+def _times(rows: Sequence[TrialRecord]) -> Iterable[str]:
     for what in dict.fromkeys(row.what for id in TIMES for row in rows if row.id == id):
         of = {row.problem: row for row in rows if row.what == what}
         targets = list(dict.fromkeys(of[name].target for name in FIGURES if name in of))
@@ -71,7 +71,7 @@ def _times(rows: Sequence[Row]) -> Iterable[str]:
         yield f"| {what} | {asked} | " + " | ".join(_cell(of.get(name)) for name in FIGURES) + " |"
 
 
-def _cell(row: Row | None) -> str:
+def _cell(row: TrialRecord | None) -> str:
     if row is None:
         return ""
     if row.value is None:
@@ -79,8 +79,8 @@ def _cell(row: Row | None) -> str:
     return f"{row.value:.3f} ({row.detail['ms']:.2f})"
 
 
-def _worst(rows: Iterable[Row]) -> Iterable[str]:
-    groups: dict[tuple[str, str], list[Row]] = {}
+def _worst(rows: Iterable[TrialRecord]) -> Iterable[str]:
+    groups: dict[tuple[str, str], list[TrialRecord]] = {}
     for row in rows:
         if row.target and row.value is not None:
             groups.setdefault((row.what, row.target), []).append(row)

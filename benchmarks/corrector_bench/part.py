@@ -7,11 +7,11 @@ import tempfile
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.corrector_bench.rows import Row, read, written
+from benchmarks.corrector_bench.rows import TrialRecord, read, written
 from benchmarks.corrector_bench.runner import process
 
 
-def part(suite: str, draws: int, limit_s: float) -> list[Row]:
+def part(suite: str, draws: int, limit_s: float) -> list[TrialRecord]:
     """The rows of one suite; if its process crashed or was killed, one row that says so."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "rows.json"
@@ -20,7 +20,7 @@ def part(suite: str, draws: int, limit_s: float) -> list[Row]:
         if out.exists():
             return read(out)
         note = f"{ended}, after {seconds:.0f} s"
-        return [Row(suite, "-", "the suite did not end", None, "<= 0", note)]
+        return [TrialRecord(suite, "-", "the suite did not end", None, "<= 0", note)]
 
 
 def main(suite: str, draws: str, out: str) -> None:

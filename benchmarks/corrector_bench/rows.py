@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 OPERATORS = {"<=": lambda value, bound: value <= bound, ">=": lambda value, bound: value >= bound}
 
 
-class Row(NamedTuple):
+class TrialRecord(NamedTuple):
     """A target and what was measured."""
 
     id: str
@@ -39,7 +39,7 @@ class Row(NamedTuple):
         return bool(OPERATORS[sign](self.value, float(bound)))
 
 
-def written(rows: Iterable[Row], path: Path, head: Mapping[str, Any]) -> None:
+def written(rows: Iterable[TrialRecord], path: Path, head: Mapping[str, Any]) -> None:
     """The rows as JSON, `head` (versions, command) before them; numbers that are not finite become null or text."""
     save({**head, "rows": records(rows)}, path)
 
@@ -50,22 +50,22 @@ def save(document: Mapping[str, Any], path: Path) -> None:
     path.write_text(json.dumps(_plain(document), indent=1) + "\n", encoding="utf-8")
 
 
-def records(rows: Iterable[Row]) -> list[dict[str, Any]]:
+def records(rows: Iterable[TrialRecord]) -> list[dict[str, Any]]:
     """Rows as mappings, with whether the target was met."""
     return [{**row._asdict(), "detail": dict(row.detail), "met": row.met} for row in rows]
 
 
-def read(path: Path) -> list[Row]:
+def read(path: Path) -> list[TrialRecord]:
     """The rows of a file."""
     return restored(json.loads(path.read_text(encoding="utf-8"))["rows"])
 
 
-def restored(records: Iterable[Mapping[str, Any]]) -> list[Row]:
+def restored(records: Iterable[Mapping[str, Any]]) -> list[TrialRecord]:
     """Rows out of mappings."""
-    return [Row(**{field: record[field] for field in Row._fields}) for record in records]
+    return [TrialRecord(**{field: record[field] for field in TrialRecord._fields}) for record in records]
 
 
-def printed(rows: Iterable[Row]) -> str:
+def printed(rows: Iterable[TrialRecord]) -> str:
     """The table for a terminal."""
     lines = [("", "problem", "what", "measured", "target", "")]
     for row in rows:

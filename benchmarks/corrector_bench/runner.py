@@ -36,7 +36,7 @@ class Ran(NamedTuple):
 def run(
     peer: str,
     problem: str,
-    level: str,
+    noise_level: str,
     draws: int,
     *,
     first: int = 0,
@@ -48,7 +48,7 @@ def run(
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
         seeds = f"{first}:{first + draws}"
-        arguments = [peer, problem, level, str(int(per_part)), seeds, str(out), ",".join(beside)]
+        arguments = [peer, problem, noise_level, str(int(per_part)), seeds, str(out), ",".join(beside)]
         ended, seconds = process(["-m", "benchmarks.corrector_bench.worker", *arguments], limit_s)
         if not out.exists():
             none = np.zeros((0, 1 + len(beside)))

@@ -11,15 +11,15 @@ from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.measures import free_basis, lengths, spread
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import FIGURES, Problem, problem
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 
-LEVEL = 0.01
+NOISE_LEVEL = 0.01
 REGION = 0.95
 FIRST = 10_000
 """Seeds of their own."""
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     """Ten times as many draws as elsewhere at 2 mm and 1 degree and with noise that differs from part to part."""
     rows = []
     for name in FIGURES:
@@ -28,7 +28,7 @@ def suite(draws: int) -> list[Row]:
     return rows
 
 
-def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
+def _rows(name: str, per_part: bool, draws: int) -> list[TrialRecord]:
     of = problem(name)
     where = f"{name} 2/1{', per part' if per_part else ''}"
     bound = chdtri(6 * of.n - of.rank, 1.0 - REGION)
@@ -42,18 +42,18 @@ def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
         seen = observation(of, given)
         made = corrected(seen)
         refused += not made.ok
-        alarms += made.test is None or made.test.p_value < LEVEL
+        alarms += made.test is None or made.test.p_value < NOISE_LEVEL
         said += bool(contains_truth(seen, made, given.truth, REGION))
         found += spread(of, given, made.goals) <= bound
         fixed_mm.append(1e3 * _across_m(of, given, made.goals))
     share = 100.0 / draws
     detail = {"draws": draws, "by geometry": found * share, "not converged": refused}
     rows = [
-        Row("Q6", where, "false alarms at 1 %, %", alarms * share, "0.4 .. 1.6", "", {"draws": draws}),
-        Row("coverage", where, "95 % regions that hold the truth, %", said * share, "93.5 .. 96.5", "", detail),
+        TrialRecord("Q6", where, "false alarms at 1 %, %", alarms * share, "0.4 .. 1.6", "", {"draws": draws}),
+        TrialRecord("coverage", where, "95 % regions that hold the truth, %", said * share, "93.5 .. 96.5", "", detail),
     ]
     what = "error across the free directions, rms, mm"
-    return [*rows, Row("coverage", where, what, float(np.sqrt(np.mean(np.square(fixed_mm)))))]
+    return [*rows, TrialRecord("coverage", where, what, float(np.sqrt(np.mean(np.square(fixed_mm)))))]
 
 
 def _across_m(of: Problem, given: Draw, goals: Array) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.geometry import Array
 from benchmarks.corrector_bench.door import CONTACT, MANY, OPEN_M, UNCOMPILED, YARDSTICK
 from benchmarks.corrector_bench.problems import FIGURES
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 from benchmarks.corrector_bench.runner import process
 
 PEERS = {
@@ -26,9 +26,9 @@ TOGETHER = {"fig2": "<= 0.05", "fig3": "<= 0.07", "fig6": "<= 0.1"}
 LIMIT_S = 300.0
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     """Our own on all draws, five times as many together, peers on a tenth."""
-    rows = list[Row]()
+    rows = list[TrialRecord]()
     for name in FIGURES:
         ms, _, note = _measured([YARDSTICK, UNCOMPILED, CONTACT], name, draws)
         rows.append(_row("P1", name, "`paper`: `correct(seen, 'paper')`", ms, 0, "", note))
@@ -70,9 +70,9 @@ def fault(gaps: Array) -> str:
     return f"fails on {raised + left} of {len(gaps)} draws: up to {1e3 * worst:.2g} mm open"
 
 
-def _row(id: str, name: str, what: str, ms: Array, way: int, target: str, fault: str) -> Row:
+def _row(id: str, name: str, what: str, ms: Array, way: int, target: str, fault: str) -> TrialRecord:
     if fault:
-        return Row(id, name, what, None, target, fault)
+        return TrialRecord(id, name, what, None, target, fault)
     ratio = float(np.median(ms[:, way] / ms[:, 0]))
     detail = {"ms": float(np.median(ms[:, way])), "paper_ms": float(np.median(ms[:, 0])), "draws": len(ms)}
-    return Row(id, name, what, ratio, target, "", detail)
+    return TrialRecord(id, name, what, ratio, target, "", detail)

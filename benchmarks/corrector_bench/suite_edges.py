@@ -15,7 +15,7 @@ from apo_bench.geometry import Array, pose
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import lined_up, problem
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 from benchmarks.corrector_bench.suite_wrong import shifted
 
 NOISE = np.array([2e-3] * 3 + [np.radians(1.0)] * 3)
@@ -23,7 +23,7 @@ MANY = 5000
 """Castles in a row, with 4,999 sticks: 9,999 operations."""
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     """Whether each trap is avoided; `draws` changes nothing."""
     traps: dict[str, Callable[[], str]] = {
         "a pose that is not finite": _not_finite,
@@ -37,7 +37,7 @@ def suite(draws: int) -> list[Row]:
     return [_row(name, trap) for name, trap in traps.items()]
 
 
-def _row(name: str, trap: Callable[[], str]) -> Row:
+def _row(name: str, trap: Callable[[], str]) -> TrialRecord:
     start = time.monotonic()
     try:
         said = trap()
@@ -45,7 +45,7 @@ def _row(name: str, trap: Callable[[], str]) -> Row:
         said = f"escaped: {type(error).__name__}: {error}"
     good = not said.startswith(("escaped", "wrong"))
     what = "a clear error or the right answer, %"
-    return Row("edge", name, what, 100.0 * good, ">= 100", f"{said} ({time.monotonic() - start:.1f} s)")
+    return TrialRecord("edge", name, what, 100.0 * good, ">= 100", f"{said} ({time.monotonic() - start:.1f} s)")
 
 
 def _not_finite() -> str:

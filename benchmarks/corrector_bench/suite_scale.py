@@ -13,7 +13,7 @@ from benchmarks.corrector_bench.draws import Draw, draw
 from benchmarks.corrector_bench.measures import quality
 from benchmarks.corrector_bench.peers import Run, Task
 from benchmarks.corrector_bench.problems import Problem, problem
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 
 CHAINS = (20, 40, 80, 200)
 GRIDS = (5, 10)
@@ -22,7 +22,7 @@ FASTER = {20: ">= 4", 40: ">= 15"}
 NAMES = (*(f"chain{k}" for k in CHAINS), *(f"grid{g}" for g in GRIDS))
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     """As many rounds as a fortieth of the draws."""
     rounds = max(2, draws // 40)
     of = {name: problem(name) for name in NAMES}
@@ -37,19 +37,19 @@ def suite(draws: int) -> list[Row]:
             if f"dense {name}" in ms:
                 ms[f"dense {name}"].append(_timed(own.dense, task, warm=False)[0])
     median = {name: float(np.median(each)) for name, each in ms.items()}
-    rows = [Row("P5", name, "contact, ms", value, "", "", {"rounds": rounds}) for name, value in median.items()]
+    rows = [TrialRecord("P5", name, "contact, ms", value, "", "", {"rounds": rounds}) for name, value in median.items()]
     ratio = float(np.median(np.divide(ms["chain200"], ms["chain20"])))
-    rows.append(Row("P5", "chain200", "time over that of chain20", ratio, "<= 12"))
+    rows.append(TrialRecord("P5", "chain200", "time over that of chain20", ratio, "<= 12"))
     slope = np.polyfit(np.log(CHAINS), np.log([median[f"chain{k}"] for k in CHAINS]), 1)[0]
-    rows.append(Row("P5", "chains", "growth exponent, K = 20 to 200", float(slope)))
+    rows.append(TrialRecord("P5", "chains", "growth exponent, K = 20 to 200", float(slope)))
     for k in DENSE:
         gain = float(np.median(np.divide(ms[f"dense chain{k}"], ms[f"chain{k}"])))
-        rows.append(Row("P5", f"chain{k}", "dense over sparse, time", gain, FASTER[k]))
+        rows.append(TrialRecord("P5", f"chain{k}", "dense over sparse, time", gain, FASTER[k]))
     for name in ("chain200", "grid10"):
         found = quality(of[name], *last[name])
-        rows.append(Row("Q1", name, "largest residual, mm", found.residual_mm, "<= 1e-6"))
-        rows.append(Row("Q2", name, "largest drift, sigma", found.drift, "<= 1e-6"))
-        rows.append(Row("Q3", name, "|z| over that of the truth", found.length / found.true_length, "<= 1"))
+        rows.append(TrialRecord("Q1", name, "largest residual, mm", found.residual_mm, "<= 1e-6"))
+        rows.append(TrialRecord("Q2", name, "largest drift, sigma", found.drift, "<= 1e-6"))
+        rows.append(TrialRecord("Q3", name, "|z| over that of the truth", found.length / found.true_length, "<= 1"))
     return rows
 
 

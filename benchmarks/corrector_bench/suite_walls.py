@@ -20,7 +20,7 @@ from benchmarks.corrector_bench.equations_in_z import InZ
 from benchmarks.corrector_bench.measures import lengths
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import Problem, problem
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 
 CLEARANCES_MM = (0.2, 1.0, 3.0, 6.0)
 SIDES = {"fig3": ("spy", "sny"), "fig6": ("A_px", "A_nx", "A_py", "A_ny", "B_px", "B_nx", "B_py", "B_ny")}
@@ -48,7 +48,7 @@ class Walled(NamedTuple):
     """What no equation and no wall that is touched accounts for in z, in sigma units: 0 at the optimum."""
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     rows = []
     for name in SIDES:
         for clearance in CLEARANCES_MM:
@@ -56,7 +56,7 @@ def suite(draws: int) -> list[Row]:
     return rows
 
 
-def _rows(of: Problem, clearance_mm: float, draws: int) -> list[Row]:
+def _rows(of: Problem, clearance_mm: float, draws: int) -> list[TrialRecord]:
     found = [_one(of, clearance_mm, seed) for seed in range(FIRST, FIRST + draws)]
     where = f"{of.name}, {clearance_mm:g} mm"
     rms = {
@@ -65,10 +65,12 @@ def _rows(of: Problem, clearance_mm: float, draws: int) -> list[Row]:
     worst = max(w.overstepped_mm for w in found)
     longer = 100 * float(np.mean([w.overlong for w in found]))
     return [
-        Row("Q7", where, "solved, %", 100 * float(np.mean([w.solved for w in found])), ">= 100", "", {"draws": draws}),
-        Row("Q7", where, "largest violation, mm", worst, f"<= {WITHIN_MM:g}"),
-        Row("Q7", where, "longer than the true correction, %", longer, "<= 0", "", rms),
-        Row("Q7", where, "largest drift, sigma", max(w.drift for w in found), "<= 1e-6"),
+        TrialRecord(
+            "Q7", where, "solved, %", 100 * float(np.mean([w.solved for w in found])), ">= 100", "", {"draws": draws}
+        ),
+        TrialRecord("Q7", where, "largest violation, mm", worst, f"<= {WITHIN_MM:g}"),
+        TrialRecord("Q7", where, "longer than the true correction, %", longer, "<= 0", "", rms),
+        TrialRecord("Q7", where, "largest drift, sigma", max(w.drift for w in found), "<= 1e-6"),
     ]
 
 

@@ -17,7 +17,7 @@ from apo_bench.geometry import Face
 from benchmarks.corrector_bench.draws import LEVELS, draw
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import FIGURES, Problem, problem
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import TrialRecord
 
 SIGMAS = 5.0
 FIRST = 20_000
@@ -33,7 +33,7 @@ class Named(NamedTuple):
     """Of the ambiguity set."""
 
 
-def suite(draws: int) -> list[Row]:
+def suite(draws: int) -> list[TrialRecord]:
     rows = []
     for name in FIGURES:
         of = problem(name)
@@ -44,7 +44,7 @@ def suite(draws: int) -> list[Row]:
     return rows
 
 
-def _rows(of: Problem, kind: str, contacts: list[int], draws: int) -> list[Row]:
+def _rows(of: Problem, kind: str, contacts: list[int], draws: int) -> list[TrialRecord]:
     named = [_named(of, contacts[seed % len(contacts)], seed) for seed in range(FIRST, FIRST + draws)]
     judged = kind == "redundant"
     each = {str(of.assembly.relations()[c].contact): 0.0 for c in contacts}
@@ -59,13 +59,15 @@ def _rows(of: Problem, kind: str, contacts: list[int], draws: int) -> list[Row]:
     }
     size = float(np.mean([n.size for n in named if n.caught])) if share["caught"] else float("nan")
     rows = [
-        Row(
+        TrialRecord(
             "Q6", of.name, f"wrong by 5 sigma, {kind}: caught, %", share["caught"], "", "", {"mean ambiguity set": size}
         ),
-        Row(
+        TrialRecord(
             "Q6", of.name, f"wrong by 5 sigma, {kind}: first, %", share["first"], ">= 95" if judged else "", "", detail
         ),
-        Row("Q6", of.name, f"wrong by 5 sigma, {kind}: in the set, %", share["ambiguous"], ">= 99" if judged else ""),
+        TrialRecord(
+            "Q6", of.name, f"wrong by 5 sigma, {kind}: in the set, %", share["ambiguous"], ">= 99" if judged else ""
+        ),
     ]
     return rows
 

@@ -31,7 +31,7 @@ class Spent(NamedTuple):
     wall_ms: float
 
 
-def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, beside: str = "") -> None:
+def main(peer: str, name: str, noise_level: str, per_part: str, seeds: str, out: str, beside: str = "") -> None:
     """Writes goals (k, n, 4, 4) of the peer and milliseconds (k, 1 + beside) of all."""
     known = peers()
     of = problem(name)
@@ -41,7 +41,7 @@ def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, 
     times = []
     wall = []
     for seed in range(first, last):
-        given = draw(of, level, seed, per_part == "1")
+        given = draw(of, noise_level, seed, per_part == "1")
         task = Task(of, of.system(given.seen), given.seen, given.covariance)
         ended = [_timed(known[each], task, again=seed == first) for each in turn]
         goals.append(ended[0][0])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench.assembly import SharedError, first_order, joint_covariance
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
 
 GOALS = np.array(
@@ -55,7 +55,7 @@ def test_what_is_shared_stands_beside_the_diagonal() -> None:
 def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     """Over 600 seeds, squared lengths of all errors together are chi-square of 6 n degrees of freedom."""
     scene = scenes.subassembly_on_castles()
-    noise = make_noise(name, Level(2.0, 2.0))
+    noise = make_noise(name, NoiseLevel(2.0, 2.0))
     shown = scenes.shown(scene)
     square = []
     for seed in range(600):

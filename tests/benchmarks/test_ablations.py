@@ -21,9 +21,9 @@ from tests import scenes
 CARELESS = ("stick_in_tower", "subassembly_on_castles", "fixture", "pockets")
 
 
-def seen(name: str, mm: float = 3.0, level: float = 0.0, low_mm: float = 0.0) -> Observation:
-    scene, goals = scenes.careless(name, mm, low_mm)
-    return scenes.seen(scene, scenes.noisy(goals, np.random.default_rng(0), level, level))
+def seen(name: str, mm: float = 3.0, noise_level: float = 0.0, low_mm: float = 0.0) -> Observation:
+    scene, goals = scenes.human_error(name, mm, low_mm)
+    return scenes.seen(scene, scenes.noisy(goals, np.random.default_rng(0), noise_level, noise_level))
 
 
 def counted(found: Correction) -> tuple[int, ...]:
@@ -114,7 +114,7 @@ def test_sets_by_size_then_by_recency_and_no_more_than_that() -> None:
     ],
 )
 def test_without_history_only_those_that_moved_a_part_last_are_corrected(name: str, freed: tuple[int, ...]) -> None:
-    given = seen(name, level=1.0)
+    given = seen(name, noise_level=1.0)
     found = no_history(given)
     assert (found.status, counted(found)) == ("converged", freed)
     assert changed(given, found) == set(freed)
@@ -125,22 +125,22 @@ def relative(poses: dict[str, Array], a: str, b: str) -> Array:
 
 
 def test_without_history_the_stick_of_example_5_2_stays_as_crooked_in_the_cube_as_it_was_seen() -> None:
-    given = seen("subassembly_on_castles", level=1.0)
+    given = seen("subassembly_on_castles", noise_level=1.0)
     after = [dict(placements(given.assembly, given.start, g)[-1]) for g in (given.goals, no_history(given).goals)]
     assert_allclose(relative(after[1], "cube", "stick"), relative(after[0], "cube", "stick"), atol=1e-12)
     assert no_history(given).gap_after_m > 1e-3 > paper(given).gap_after_m
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0])
-def test_without_history_the_cubes_of_fig_6_stay_where_they_were_seen_on_the_stick(level: float) -> None:
-    given = seen("pockets", level=level)
+@pytest.mark.parametrize("noise_level", [0.0, 1.0])
+def test_without_history_the_cubes_of_fig_6_stay_where_they_were_seen_on_the_stick(noise_level: float) -> None:
+    given = seen("pockets", noise_level=noise_level)
     found = no_history(given)
     assert_array_equal(found.goals[[1, 2, 4]], given.goals[[1, 2, 4]])
     assert found.gap_after_m > 1e-3
 
 
 def test_without_history_the_end_of_the_simple_case_is_the_same() -> None:
-    given = seen("stick_in_tower", level=1.0)
+    given = seen("stick_in_tower", noise_level=1.0)
     assert_allclose(no_history(given).goals, paper(given).goals, atol=1e-12)
 
 
@@ -161,7 +161,7 @@ def test_without_what_disappeared_the_fixture_of_example_5_3_stays_wrong() -> No
 
 
 def test_without_what_disappeared_the_first_cube_of_fig_6_is_no_candidate_but_settled() -> None:
-    given = seen("pockets", level=1.0)
+    given = seen("pockets", noise_level=1.0)
     found = no_disappeared(given)
     assert counted(found) == (6, 5, 4, 3, 2)
     assert changed(given, found) == {1, 2, 3, 4, 5, 6}
@@ -169,6 +169,6 @@ def test_without_what_disappeared_the_first_cube_of_fig_6_is_no_candidate_but_se
 
 
 def test_where_nothing_disappeared_it_is_the_paper() -> None:
-    given = seen("stick_in_tower", level=2.0)
+    given = seen("stick_in_tower", noise_level=2.0)
     assert_array_equal(no_disappeared(given).goals, paper(given).goals)
     assert no_disappeared(given).sentence == paper(given).sentence == "every contact holds within 0.1 mm"

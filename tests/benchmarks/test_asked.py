@@ -10,7 +10,7 @@ from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from benchmarks.asked import ROBUST, ROUND, Kept, asked_trials, block, found_trials, said
 
 ROOT = Path(__file__).parents[2]
-PLAIN = ("none", "snap", "snap+search", "by-heart")
+PLAIN = ("uncorrected", "snap", "snap+spiral", "nominal")
 
 
 @pytest.mark.parametrize("kept", [ROBUST, ROUND], ids=["robust", "round"])
@@ -31,16 +31,16 @@ def test_a_part_is_counted_cell_by_cell() -> None:
 def test_a_trial_that_a_file_names_twice_is_asked_for_once(tmp_path: Path) -> None:
     path = tmp_path / "sweep.toml"
     path.write_text(
-        'scenarios = ["block_on_block"]\nlevels = [1]\ncareless = [0]\nmethods = ["none", "oracle"]\ntrials = 3\n'
-        '[[also]]\nmethods = ["none"]\ntrials = 5\n'
+        'scenarios = ["block_on_block"]\nlevels = [1]\ncareless = [0]\nmethods = ["uncorrected", "oracle"]\ntrials = 3\n'
+        '[[also]]\nmethods = ["uncorrected"]\ntrials = 5\n'
     )
-    asked = asked_trials([path, path], ("scenario", "method", "level"))
-    assert asked == {("block_on_block", "none", 1.0): 5, ("block_on_block", "oracle", 0.0): 3}
+    asked = asked_trials([path, path], ("scenario", "method", "noise_level"))
+    assert asked == {("block_on_block", "uncorrected", 1.0): 5, ("block_on_block", "oracle", 0.0): 3}
 
 
-@pytest.mark.parametrize("name", ["headline", "robust", "round", "gearbox", "arms", "robot_errors", "baselines"])
+@pytest.mark.parametrize("name", ["headline", "robust", "round", "gearbox", "arms", "robot_error", "baselines"])
 def test_every_sweep_has_snap_and_what_memory_is_worth(name: str) -> None:
-    methods = {method for grid in read_sweep(ROOT / "benchmarks" / f"{name}.toml") for method in grid.methods}
+    methods = {method for grid in read_sweep(ROOT / "benchmarks" / f"{name}.toml") for method in grid.method}
     assert methods >= set(PLAIN[1:])
 
 

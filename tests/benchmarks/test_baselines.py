@@ -26,7 +26,7 @@ def test_the_robot_can_do_every_scenario_and_contact_does() -> None:
 
 
 def test_memory_fails_in_eight_scenarios() -> None:
-    fails = [p.scenario for p, count in kept().items() if p[1:] == ("by-heart", 4.0) and count.rate <= BY_HEART]
+    fails = [p.scenario for p, count in kept().items() if p[1:] == ("nominal", 4.0) and count.rate <= BY_HEART]
     assert len(fails) >= 8
 
 
@@ -40,13 +40,13 @@ def test_a_card_says_what_the_counts_mean() -> None:
     tower = load_scenario("stick_in_tower")
     assert "`snap` is enough" in asks(tower, counts)
     assert "Goals by heart are enough (10 of 10 at level 4): it stands on the plain table alone" in asks(tower, counts)
-    counts |= {Place(tower.name, "snap", 2.0): Count(10, 5), Place(tower.name, "by-heart", 4.0): Count(10, 2)}
+    counts |= {Place(tower.name, "snap", 2.0): Count(10, 5), Place(tower.name, "nominal", 4.0): Count(10, 2)}
     assert "It needs more than `snap` (5 of 10 at level 2)" in asks(tower, counts)
     assert "Goals by heart fail (2 of 10 at level 4)" in asks(tower, counts)
     assert set(scenario_names()) == {place.scenario for place in counts}
 
 
 def test_trials_whose_demonstration_failed_do_not_count() -> None:
-    row = {"scenario": "a", "method": "none", "level": 2.0}
+    row = {"scenario": "a", "method": "uncorrected", "noise_level": 2.0}
     rows = [{**row, "success": success} for success in (True, False, None)]
-    assert counted(rows) == {Place("a", "none", 2.0): Count(2, 1)}
+    assert counted(rows) == {Place("a", "uncorrected", 2.0): Count(2, 1)}

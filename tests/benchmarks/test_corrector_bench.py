@@ -19,7 +19,7 @@ from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.peers import Task, newton, peers
 from benchmarks.corrector_bench.problems import problem
 from benchmarks.corrector_bench.reference import optimum
-from benchmarks.corrector_bench.rows import Row, printed, read, records, written
+from benchmarks.corrector_bench.rows import TrialRecord, printed, read, records, written
 from benchmarks.corrector_bench.runner import process, run
 from benchmarks.corrector_bench.suite_wrong import redundant, shifted
 
@@ -71,11 +71,11 @@ def test_an_observation_is_as_wrong_as_its_covariance_says() -> None:
     assert len({one.covariance[0, 0, 0] for one in given}) == 400
 
 
-@pytest.mark.parametrize("level", ["2/1", "10/8"])
+@pytest.mark.parametrize("noise_level", ["2/1", "10/8"])
 @pytest.mark.parametrize("name", ["fig2", "fig3", "fig6"])
-def test_the_reference_meets_the_conditions_of_an_optimum(name: str, level: str) -> None:
+def test_the_reference_meets_the_conditions_of_an_optimum(name: str, noise_level: str) -> None:
     of = problem(name)
-    given = draw(of, level, 3)
+    given = draw(of, noise_level, 3)
     best = optimum(of, given)
     found = quality(of, given, best.goals)
     assert found.residual_mm < 1e-9
@@ -182,11 +182,11 @@ def test_a_way_that_raises_or_leaves_a_contact_open_is_not_timed() -> None:
 
 def test_the_page_lists_what_was_missed_and_what_failed() -> None:
     rows = [
-        Row("P1", "fig2", "`contact`", 1.2, "<= 1.3", "", {"ms": 0.5}),
-        Row("P1", "fig3", "`contact`", 1.4, "<= 1.3", "", {"ms": 0.6}),
-        Row("P3", "fig2", "peer", None, "", "no solution"),
-        Row("Q1", "fig2 2/1", "gap, mm", 2e-12, "<= 1e-9"),
-        Row("Q1", "fig3 2/1", "gap, mm", 3e-12, "<= 1e-9"),
+        TrialRecord("P1", "fig2", "`contact`", 1.2, "<= 1.3", "", {"ms": 0.5}),
+        TrialRecord("P1", "fig3", "`contact`", 1.4, "<= 1.3", "", {"ms": 0.6}),
+        TrialRecord("P3", "fig2", "peer", None, "", "no solution"),
+        TrialRecord("Q1", "fig2 2/1", "gap, mm", 2e-12, "<= 1e-9"),
+        TrialRecord("Q1", "fig3 2/1", "gap, mm", 3e-12, "<= 1e-9"),
     ]
     suite = {"commit": "abc", "draws": 3, "rows": records(rows)}
     text = page({"versions": {"numpy": "2"}, "machine": "here", "suites": {"door": suite}})
@@ -214,10 +214,10 @@ def test_a_suite_that_cannot_run_is_a_missed_target() -> None:
 
 def test_rows_are_written_and_read_back(tmp_path: Path) -> None:
     rows = [
-        Row("Q1", "fig2", "a", 1e-12, "<= 1e-9", "", {"draws": 3}),
-        Row("Q6", "fig2", "b", 2.0, "0.4 .. 1.6"),
-        Row("P2", "fig2", "c", None, "<= 0.15", "numba is missing"),
-        Row("peer", "fig2", "d", float("nan")),
+        TrialRecord("Q1", "fig2", "a", 1e-12, "<= 1e-9", "", {"draws": 3}),
+        TrialRecord("Q6", "fig2", "b", 2.0, "0.4 .. 1.6"),
+        TrialRecord("P2", "fig2", "c", None, "<= 0.15", "numba is missing"),
+        TrialRecord("peer", "fig2", "d", float("nan")),
     ]
     assert [row.met for row in rows] == [True, False, False, None]
     written(rows, tmp_path / "deep" / "out.json", {"draws": 3})

@@ -4,13 +4,13 @@ import json
 import sys
 
 import pytest
+from benchmarks.robot_errors import page
 
 from apo_bench.simulation.execution.probing.feeling import ACTS
 from benchmarks import feel_acts
 from benchmarks.feel_acts import ALL, HALF_STEP, VARIANTS, Case, acts_of, lines_of, missing, settings_of, table
-from benchmarks.robot_errors import page
 
-HERE = ("stick_in_tower", "oracle+feel")
+HERE = ("stick_in_tower", "oracle+probe")
 
 
 def line(variant, seed, success, scenario=HERE[0]):
@@ -26,7 +26,7 @@ def test_half_the_step_changes_nothing_else():
     usual, half = (settings_of(Case(*HERE, variant, 3)) for variant in (ALL, HALF_STEP))
     assert vars(half) == vars(usual) | {"timestep_s": usual.timestep_s / 2}
     assert usual.robot_error.count("+") == 3
-    assert (usual.careless, usual.level_mm, usual.fidelity) == (0.0, 1.0, "contact")
+    assert (usual.human_error_scale, usual.noise_mm, usual.fidelity) == (0.0, 1.0, "contact")
 
 
 def test_what_is_there_is_not_run_again():
@@ -48,16 +48,16 @@ def test_the_table_counts_pairs():
     lines = [line(ALL, seed, True) for seed in range(4)] + [line("lay", seed, seed > 1) for seed in range(5)]
     lines += [line("lay", 9, None)]
     said = table(lines).splitlines()
-    assert said[2] == "| `oracle+feel` | nothing | 4 of 4 | 4 of 4 (51 to 100 %) |  |"
-    assert said[3] == "| `oracle+feel` | `lay` | 3 of 5 | 3 of 5 (23 to 88 %) | 2, 0 |"
+    assert said[2] == "| `oracle+probe` | nothing | 4 of 4 | 4 of 4 (51 to 100 %) |  |"
+    assert said[3] == "| `oracle+probe` | `lay` | 3 of 5 | 3 of 5 (23 to 88 %) | 2, 0 |"
     assert "## Each act left out" in page([], lines)
     assert "## Each act left out" not in page([])
 
 
 def test_a_method_that_does_not_feel_is_refused(tmp_path, monkeypatch, capsys):
     out = tmp_path / "acts.jsonl"
-    monkeypatch.setattr(sys, "argv", ["feel_acts", "--out", str(out), "--methods", "oracle"])
+    monkeypatch.setattr(sys, "argv", ["feel_acts", "--out", str(out), "--method", "oracle"])
     with pytest.raises(SystemExit):
         feel_acts.main()
-    assert "write oracle+feel" in capsys.readouterr().err
+    assert "write oracle+probe" in capsys.readouterr().err
     assert not out.exists()

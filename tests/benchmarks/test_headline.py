@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
-from apo_bench import SweepSettings
+from apo_bench import SweepConfig
 from apo_bench.benchmark.analysis import Cell, tally
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.records import ROW
+from apo_bench.records import RECORD_SCHEMA
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
 from benchmarks.headline_figure import NAME_HEIGHT, apart
@@ -32,7 +32,10 @@ MOST_TRIALS = 16_000
 @cache
 def kept_rows() -> list[dict[str, Any]]:
     rows = headline.kept_rows()
-    return [row if row["schema"] == ROW else {"as_demonstrated": row["success"], "salt": None} | row for row in rows]
+    return [
+        row if row["schema"] == RECORD_SCHEMA else {"as_demonstrated": row["success"], "secret_seed": None} | row
+        for row in rows
+    ]
 
 
 @cache
@@ -47,19 +50,19 @@ def fidelity() -> str:
 
 def key(row: dict[str, Any]) -> tuple[Any, ...]:
     where = (row["noise"], row.get("robot_error") or "none")
-    return row["scenario"], row["seed"], row["method"], row["level"], row["careless"], *where
+    return row["scenario"], row["seed"], row["method"], row["noise_mm"], row["human_error_scale"], *where
 
 
-def grid_of(described: dict[str, Any]) -> SweepSettings:
+def grid_of(described: dict[str, Any]) -> SweepConfig:
     """A grid of `run.json`; clearances are those of the scenarios."""
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in described.items()}
-    return SweepSettings(**{**values, "clearances_mm": ()})
+    return SweepConfig(**{**values, "clearance_mm": ()})
 
 
 def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
     grids = [grid_of(described) for described in run_file()["grids"]]
     asked = [trial for unit in units(grids, load_all(grids)) for trial in unit]
-    expected = [(t.scenario, t.seed, t.method, t.level_mm, t.careless, t.noise, t.robot_error) for t in asked]
+    expected = [(t.scenario, t.seed, t.method, t.noise_mm, t.human_error_scale, t.noise, t.robot_error) for t in asked]
     assert sorted(map(key, kept_rows())) == sorted(expected)
     assert run_file()["rows"] == len(expected)
 
@@ -72,10 +75,12 @@ def test_the_sweep_of_the_headline_is_small_and_meets_what_breaks_it() -> None:
     grids = read_sweep(GRID, {"trials": 1})
     trials = [trial for unit in units(grids, load_all(grids)) for trial in unit]
     assert SEEDS * len(trials) <= MOST_TRIALS
-    by_method = {method: {t.level_mm for t in trials if t.method == method and t.careless == 0} for method in METHODS}
+    by_method = {
+        method: {t.noise_mm for t in trials if t.method == method and t.human_error_scale == 0} for method in METHODS
+    }
     assert all(by_method[method] >= {0.1, 0.25, 0.5, 1.0, 2.0, 4.0} for method in METHODS)
     assert {"isotropic", "outliers", "megapose-tless"} <= {t.noise for t in trials}
-    assert {"oracle", "contact-robust", "contact-robust+search"} == {
+    assert {"oracle", "contact-robust", "contact-robust+spiral"} == {
         t.method for t in trials if t.robot_error != "none"
     }
 
@@ -85,12 +90,14 @@ def test_the_table_is_that_of_the_rows() -> None:
     names = lines[0].split(",")
     told = [dict(zip(names, line.split(","), strict=False)) for line in lines[1:]]
     counted = {
-        (t["scenario"], t["noise"], t["method"], float(t["level_mm"]), float(t["careless"]), error_of(t)): t
+        (t["scenario"], t["noise"], t["method"], float(t["noise_mm"]), float(t["human_error_scale"]), error_of(t)): t
         for t in told
     }
     assert len(counted) == len(lines) - 1
     for cell in tally(kept_rows()):
-        line = counted[cell.scenario, cell.noise, cell.method, cell.level, cell.careless, cell.robot_error]
+        line = counted[
+            cell.scenario, cell.noise, cell.method, cell.noise_level, cell.human_error_scale, cell.robot_error
+        ]
         assert (int(line["trials"]), int(line["successes"])) == (cell.trials, cell.successes)
 
 
@@ -114,20 +121,20 @@ def test_the_first_look_is_the_same_on_every_page_and_that_of_the_rows(page: Pat
 def cell(method: str, successes: int, **more: Any) -> Cell:
     """Ten trials at level 1, a careful human."""
     first = next(c for c in tally(kept_rows()) if c.scenario == "stick_in_tower")
-    plain = replace(first, careless=0.0, level=1.0, level_deg=1.0, trials=10, excluded=0)
+    plain = replace(first, human_error_scale=0.0, noise_level=1.0, noise_deg=1.0, trials=10, excluded=0)
     return replace(plain, **{"method": method, "successes": successes, "demonstrated": successes, **more})
 
 
 CELLS = [
-    cell("none", 1),
-    cell("search", 2),
+    cell("uncorrected", 1),
+    cell("spiral-search", 2),
     cell("contact", 9),
     cell("contact-robust", 10),
-    cell("contact-robust", 0, careless=1.0),
+    cell("contact-robust", 0, human_error_scale=1.0),
     cell("contact-robust", 6, noise="megapose-tless"),
     cell("contact-robust", 3, robot_error="hand_eye:0.5/0.1"),
-    cell("contact-robust+search", 7, robot_error="hand_eye:0.5/0.1"),
-    cell("oracle", 4, level=0.0, robot_error="hand_eye:0.5/0.1"),
+    cell("contact-robust+spiral", 7, robot_error="hand_eye:0.5/0.1"),
+    cell("oracle", 4, noise_level=0.0, robot_error="hand_eye:0.5/0.1"),
 ]
 
 
@@ -143,8 +150,12 @@ def test_the_oracle_under_an_error_of_the_robot_is_found_at_level_zero() -> None
 
 
 def test_every_rate_stands_in_its_line_and_column() -> None:
-    shown = [cell("none", 1), cell("none", 3, level=2.0), cell("search", 5, level=2.0, demonstrated=4)]
-    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.level)
+    shown = [
+        cell("uncorrected", 1),
+        cell("uncorrected", 3, noise_level=2.0),
+        cell("spiral-search", 5, noise_level=2.0, demonstrated=4),
+    ]
+    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.noise_level)
     assert lines == ["| method | 1 | 2 |", "|---|--:|--:|", "| none | 10 | 30 |", "| search |  | 50 (40) |"]
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import TrialSettings, run_trial
-from apo_bench.trial.promise_table import RATES, SCORES
+from apo_bench import TrialConfig, run_trial
+from apo_bench.trial.predicted_success_table import RATES, SCORES
 from benchmarks.promise import KEPT, pooled, table
 from benchmarks.promise_page import calibration_error, skill, within
 from benchmarks.promise_scenes import FAMILIES, blocks, scenario_of_blocks
@@ -60,6 +60,6 @@ def test_no_trial_of_the_calibration_is_held_out() -> None:
 @pytest.mark.parametrize("seed", range(100, 100 + len(FAMILIES)))
 def test_an_assembly_of_blocks_is_put_together_by_who_knows_the_truth(seed: int, tmp_path: Path) -> None:
     assert len(blocks(seed).places) >= 2
-    row = run_trial(TrialSettings(str(scenario_of_blocks(seed, tmp_path)), method="oracle", fidelity="contact"))
+    row = run_trial(TrialConfig(str(scenario_of_blocks(seed, tmp_path)), method="oracle", fidelity="near-contact"))
     assert row["success"]
-    assert row["promised"] > 0.5
+    assert row["predicted_success"] > 0.5

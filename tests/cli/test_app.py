@@ -12,15 +12,15 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.cli import app as cli
-from apo_bench.records import ROW
+from apo_bench.records import RECORD_SCHEMA
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.scenario.file import scenario_names
 
-TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "none")
-MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "none")
-HOPELESS = ("--level", "40")
+TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "uncorrected")
+MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "uncorrected")
+HOPELESS = ("--noise-level", "40")
 """Plans at this level are refused before the arm moves, so that a replay costs little."""
-QUICK = ("--fidelity", "contact")
+QUICK = ("--fidelity", "near-contact")
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -117,7 +117,7 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
     import mujoco
 
     path = tmp_path / "scene.xml"
-    code, out, _ = run(capsys, "scene", "stick_in_tower", "--out", str(path), "--clearance", "0.4")
+    code, out, _ = run(capsys, "scene", "stick_in_tower", "--out", str(path), "--clearance-mm", "0.4")
     assert code == 0
     assert str(path) in out
     assert mujoco.MjModel.from_xml_path(str(path)).nbody > 5
@@ -128,7 +128,7 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
 def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from inspect import signature
 
-    from apo_bench import Corrected, SweepSettings, TrialSettings, correct
+    from apo_bench import Corrected, SweepConfig, TrialConfig, correct
     from apo_bench.cli.correct_command import correct_command
     from apo_bench.cli.setting_options import trial_options
     from apo_bench.cli.show import show_command
@@ -139,8 +139,8 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     assert f"default: {CORRECTOR}," in asked.annotation.__metadata__[0].help
     commands = [signature(show_command).parameters["method"].default]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
-    assert {*commands, *doors, TrialSettings("").method} == {CORRECTOR}
-    assert CORRECTOR in SweepSettings(("stick_in_tower",)).methods
+    assert {*commands, *doors, TrialConfig("").method} == {CORRECTOR}
+    assert CORRECTOR in SweepConfig(("stick_in_tower",)).method
     assert f"default: {CORRECTOR}." in trial_options("method")[0].annotation.__metadata__[0].help
 
 
@@ -149,7 +149,7 @@ def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
     assert (code, err) == (0, "")
     assert out.count("\n") == 1
     row = json.loads(out)
-    assert (row["schema"], row["seed"], row["method"], row["success"]) == (ROW, 5, "paper", True)
+    assert (row["schema"], row["seed"], row["method"], row["success"]) == (RECORD_SCHEMA, 5, "paper", True)
 
 
 def test_a_replay_that_fails_is_a_result(capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,8 +169,8 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
     for key in ("success", "failure_stage", "failure_code", "failure_operation"):
         assert after[key] == before[key]
     assert after["gap_before_mm"] == pytest.approx(before["gap_before_mm"], rel=1e-9)
-    assert (after["level"], after["noise"]) == (None, "measured")
-    assert after["spec_hash"] != before["spec_hash"]
+    assert (after["noise_level"], after["noise"]) == (None, "measured")
+    assert after["config_hash"] != before["config_hash"]
     _, out, _ = run(capsys, *MEASURED, "--observation", str(path))
     assert "measured observation" in out
 
@@ -221,7 +221,7 @@ def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypa
 def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out_folder = tmp_path / "run"
     code, out, err = run(
-        capsys, "sweep", "block_on_block", "--levels", "40", "--careless", "0", "--methods", "none", "--trials", "2",
+        capsys, "sweep", "block_on_block", "--noise-level", "40", "--human-error-scale", "0", "--method", "uncorrected", "--trials", "2",
         "--seed", "3", "--grasp", "weld", "--workers", "1", "--out", str(out_folder),
     )  # fmt: skip
     assert (code, err) == (0, "")
@@ -238,7 +238,7 @@ WRONG = {
     "seed is no number": (("--seed", "1.5"), "--seed"),
     "method": (("--method", "papr"), "did you mean 'paper'"),
     "module": (("--method", "no_such_module:corrector"), "cannot be imported"),
-    "both": (("--observation", "x.json", "--level", "1"), "--level was given together with --observation"),
+    "both": (("--observation", "x.json", "--noise-level", "1"), "--noise-level was given together with --observation"),
     "oracle of a file": (("--observation", "SEEN", "--method", "oracle"), "truth is not known"),
     "unknown option": (("--nois", "isotropic"), "--nois"),
 }

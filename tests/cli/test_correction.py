@@ -82,8 +82,8 @@ def test_an_observation_is_explained_where_it_is_corrected_to(capsys: pytest.Cap
     for part, operation in zip(found["parts"], made["operations"], strict=True):
         assert part["position_mm"] == pytest.approx(operation["position_mm"], abs=1e-6)
     assert found.pop("hypotheses") == made["hypotheses"] == []
-    assert made["explanation"] | {"promised": made["promised"]} == found
-    assert 0.0 < found["promised"] < 1.0
+    assert made["explanation"] | {"predicted_success": made["predicted_success"]} == found
+    assert 0.0 < found["predicted_success"] < 1.0
 
 
 def test_what_was_left_out_is_not_said_to_be_kept_as_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

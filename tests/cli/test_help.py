@@ -13,8 +13,8 @@ import typer
 from apo_bench.cli.app import app, main
 from apo_bench.cli.completion import completion, offered_names
 from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
-from apo_bench.perception.observation.noise import NOISES, Level, make_noise
-from apo_bench.records.short_names import checked_method, checked_relations
+from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
+from apo_bench.records.short_names import checked_contact_source, checked_method
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
@@ -76,10 +76,10 @@ def test_names_that_are_offered_are_the_names_there_are() -> None:
     assert tuple(offered_names("scenario")) == scenario_names()
     assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
     assert [checked_method(name) for name in offered_names("method")] == offered_names("method")
-    assert [checked_relations(name) for name in offered_names("relations") if name != "shifted"]
+    assert [checked_contact_source(name) for name in offered_names("contact_source") if name != "shifted"]
     assert set(NOISES) < set(offered_names("noise"))
     for name in offered_names("noise"):
-        assert make_noise(name, Level(1.0, 1.0))
+        assert make_noise(name, NoiseLevel(1.0, 1.0))
 
 
 def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
@@ -92,7 +92,7 @@ def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
 @pytest.mark.parametrize(
     ("shell", "typed", "words", "not_offered"),
     [
-        ("bash", "apo-bench sweep stick_in_tower --methods none,contact", "none,contact-robust", "paper"),
+        ("bash", "apo-bench sweep stick_in_tower --method uncorrected,contact", "none,contact-robust", "paper"),
         ("fish", "apo-bench replay stick_in_tower --noise mega", "megapose-tless", "isotropic"),
     ],
 )

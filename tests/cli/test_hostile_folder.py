@@ -22,12 +22,12 @@ TRIED = (
 )
 """What a trace of all commands found to be tried and not always there, and some that are always there."""
 SHORT = (
-    *("--trials", "1", "--levels", "1", "--careless", "0", "--fidelity", "contact"),
-    *("--methods", "none,mine:correct", "--workers", "2"),
+    *("--trials", "1", "--noise-level", "1", "--human-error-scale", "0", "--fidelity", "near-contact"),
+    *("--method", "uncorrected,mine:correct", "--workers", "2"),
 )
 COMMANDS = """
 graph block_on_block --out graph.png
-show block_on_block --level 1 --out show.png
+show block_on_block --noise-level 1 --out show.png
 explain block_on_block
 noise card isotropic
 recognise block_on_block

@@ -217,7 +217,7 @@ def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp
     cells[3] = f"{float(cells[3]) + 0.5:g}"
     aside = tmp_path / "seen.csv"
     aside.write_text("\n".join([*lines[:2], ",".join(cells), *lines[3:]]), encoding="utf-8")
-    for method, changed in (("none", [2]), ("contact", [1, 2, 3])):
+    for method, changed in (("uncorrected", [2]), ("contact", [1, 2, 3])):
         texts = []
         for path in (SEEN, aside):
             code, out, err = run(capsys, "plan", "stick_in_tower", "--observation", str(path), "--method", method)

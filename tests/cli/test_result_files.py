@@ -32,7 +32,7 @@ COMMANDS = {
     f"recording import {LOG} --objects objects.toml --scenario stick_in_tower --out seen.json --picture seen.png "
     "--paths seen_paths.csv": "seen.json seen.png seen_paths.csv",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
-    "replay block_on_block --save-observation saved.json --video film.gif --fidelity contact": "saved.json film.gif",
+    "replay block_on_block --save-observation saved.json --video film.gif --fidelity near-contact": "saved.json film.gif",
     "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",
     "scenario new --parts block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
     "leaderboard entries --out page.md": "page.md page.png",

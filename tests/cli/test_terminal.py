@@ -18,7 +18,7 @@ REACHED = {"worst_gap_mm": 7.0, "least_overlap": 1.0}
 
 def told(capsys: pytest.CaptureFixture[str], success: bool, **more: Any) -> str:
     end = result(Outcome("judge", "gap", None, "a gap is left"), success=success)
-    print_row({**row("contact", 0, success, eye="noise"), **end, **more})  # type: ignore[typeddict-item]
+    print_row({**row("contact", 0, success, pose_source="noise-model"), **end, **more})  # type: ignore[typeddict-item]
     return capsys.readouterr().out
 
 
@@ -40,7 +40,7 @@ def test_a_contact_that_was_not_made_is_told_with_its_gap_whatever_the_overlap(
 )
 def test_a_test_says_whether_it_passes(p: float, passes: bool, words: str, capsys: pytest.CaptureFixture[str]) -> None:
     suspects = [] if passes else ["R2", "R4"]
-    more = {"chi_square": 8.0, "chi_square_freedom": 13, "p_value": p, "test_passes": passes, "suspects": suspects}
+    more = {"chi_square": 8.0, "chi_square_dof": 13, "p_value": p, "test_passes": passes, "suspects": suspects}
     assert words in told(capsys, True, **more)
 
 
@@ -53,10 +53,20 @@ def test_demonstrations_that_failed_are_counted(count: int, words: str, capsys: 
 def test_what_a_robot_felt_is_a_line_and_what_it_was_given_stands_with_the_trial(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    sizes = {"touches": 9, "touches_refused": 1, "felt_mm": 0.62, "felt_deg": 0.08}
-    sizes |= {"felt_sure_mm": 0.05, "felt_sure_deg": 0.01, "wrench": "cobot", "stated_error": "drawn"}
-    said = " ".join(told(capsys, True, **{**sizes, "method": "contact+feel"}).split())
+    sizes = {
+        "probe_contacts": 9,
+        "probe_contacts_rejected": 1,
+        "base_error_estimate_mm": 0.62,
+        "base_error_estimate_deg": 0.08,
+    }
+    sizes |= {
+        "base_error_std_mm": 0.05,
+        "base_error_std_deg": 0.01,
+        "ft_sensor": "joint-torque",
+        "assumed_robot_error": "matched",
+    }
+    said = " ".join(told(capsys, True, **{**sizes, "method": "contact+probe"}).split())
     assert "its base is off by 0.62 mm and 0.08 degrees (deviations 0.05 and 0.01): 9 touches, 1 more refused" in said
     assert ", wrench cobot" in said
     assert "stated error" not in said
-    assert "wrench" not in told(capsys, True, wrench="cobot", touches=None)
+    assert "ft_sensor" not in told(capsys, True, ft_sensor="joint-torque", touches=None)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench import InputError, Scene, TrialSettings, build_scene, correct, load_scenario
+from apo_bench import InputError, Scene, TrialConfig, build_scene, correct, load_scenario
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import trial_row
@@ -90,7 +90,7 @@ def scene() -> Scene:
 
 
 def row_of(scene: Scene, method: str, **more: Any) -> dict[str, Any]:
-    settings = TrialSettings("block_on_block", careless=0.0, method=method, seed=1, **more)
+    settings = TrialConfig("block_on_block", human_error_scale=0.0, method=method, seed=1, **more)
     return dict(trial_row(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
 
 
@@ -107,7 +107,7 @@ def test_a_corrector_that_misbehaves_is_a_failure_with_its_sentence(name: str, s
 
 
 def test_a_corrector_of_ones_own_may_look_again(scene: Scene) -> None:
-    assert "2 looks" in row_of(scene, "users:asking", looks=2)["sentence"]
+    assert "2 looks" in row_of(scene, "users:asking", max_reobservations=2)["sentence"]
 
 
 @pytest.mark.parametrize(

@@ -293,7 +293,7 @@ def test_parts_of_any_pieces_settle():
     observation, truth = case("shaft on plane", mm=1e-3, deg=1e-3)
     raised = np.array(observation.goals)
     raised[1, 2, 3] += 2 * MM
-    made = correct(replace(observation, goals=raised), with_simulated("settle"))
+    made = correct(replace(observation, goals=raised), with_simulated("physics-settle"))
     assert made.ok, made.sentence
     assert made.goals[1, 2, 3] == pytest.approx(truth[1, 2, 3], abs=0.1 * MM)
 

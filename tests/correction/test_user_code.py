@@ -16,12 +16,12 @@ from apo_bench.assembly import Contact, PartFace
 from apo_bench.cli.app import main
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import failed
-from apo_bench.perception.observation.noise import Level, make_noise
-from apo_bench.perception.observation.relations import with_relations
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.wrong_contacts import with_contacts
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
-LEVEL = Level(1.0, 1.0)
+NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 CODE = """
 from __future__ import annotations
 
@@ -93,12 +93,23 @@ def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize("name", RAISED)
 def test_a_card_and_a_replay_of_noise_that_raises(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     refused(["noise", "card", f"users_code:{name}"], RAISED[name], capsys)
-    trial = ["replay", "stick_in_tower", "--careless", "0", "--grasp", "weld"]
+    trial = ["replay", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld"]
     refused([*trial, "--noise", f"users_code:{name}"], RAISED[name], capsys)
 
 
 def test_a_sweep_of_noise_that_raises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cells = ["--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1", "--grasp", "weld"]
+    cells = [
+        "--noise-level",
+        "1",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected",
+        "--trials",
+        "1",
+        "--grasp",
+        "weld",
+    ]
     work = ["--workers", "1", "--out", str(tmp_path / "run")]
     refused(["sweep", "stick_in_tower", *cells, *work, "--noise", "users_code:name"], RAISED["name"], capsys)
 
@@ -106,15 +117,15 @@ def test_a_sweep_of_noise_that_raises(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_an_environment_whose_noise_raises() -> None:
     with pytest.raises(InputError, match=r"'Init' failed: it raised RuntimeError|'users_code:Init' failed"):
         APOReplay(noise="users_code:Init")
-    env = APOReplay(noise="users_code:name", careless=0.0, grasp="weld")
+    env = APOReplay(noise="users_code:name", human_error_scale=0.0, grasp="weld")
     with pytest.raises(InputError, match="the noise model 'name' failed: it raised NameError"):
         env.reset(seed=0)
 
 
 def test_relations_that_raise(capsys: pytest.CaptureFixture[str]) -> None:
-    trial = ["replay", "stick_in_tower", "--careless", "0", "--grasp", "weld", "--method", "contact"]
+    trial = ["replay", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld", "--method", "contact"]
     words = "the relations 'relations' failed: told nothing; mend it, or use another."
-    refused([*trial, "--relations", "users_code:relations"], words, capsys)
+    refused([*trial, "--contact-source", "users_code:relations"], words, capsys)
 
 
 def _raising(error: Exception) -> Any:
@@ -145,9 +156,9 @@ def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
     seen = scenes.seen(TOWER, TOWER.goals)
     rng = np.random.default_rng(0)
     with pytest.raises(InputError) as by_noise:
-        observe(scenes.shown(TOWER), make_noise(_raising(error), LEVEL), rng)
+        observe(scenes.shown(TOWER), make_noise(_raising(error), NOISE_LEVEL), rng)
     with pytest.raises(InputError) as by_relations:
-        with_relations(seen, _raising(error), TOWER.goals, rng)
+        with_contacts(seen, _raising(error), TOWER.goals, rng)
     for raised in (by_noise, by_relations):
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)
@@ -166,13 +177,13 @@ def test_relations_name_faces_that_there_are() -> None:
         return replace(assembly, operations=(replace(first, contacts=(made,)), *others))
 
     with pytest.raises(InputError, match=r"'invents' returned a contact of table\.cellar, which is no face"):
-        with_relations(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
+        with_contacts(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("given", ["users_code:nope", "users_code:Pathh", "users_code:annotation", "users_code:maths"])
 def test_only_what_a_module_makes_itself_is_suggested(given: str) -> None:
     with pytest.raises(InputError) as raised:
-        make_noise(given, LEVEL)
+        make_noise(given, NOISE_LEVEL)
     said = str(raised.value)
     assert said.endswith("Known: Init, Slow, imports, mine, name, plain, relations.")
     assert all(f"'{other}'" not in said for other in ("np", "Path", "annotations", "math"))

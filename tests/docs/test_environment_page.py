@@ -52,7 +52,7 @@ def test_without_same_step_every_second_step_only_resets() -> None:
             vector_kwargs={"autoreset_mode": mode},
             scenario="block_on_block",
             grasp="weld",
-            level=0.1,
+            noise_level=0.1,
         )
         many.reset(seed=0)
         action = np.zeros(many.action_space.shape)

@@ -41,7 +41,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"replay .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
     r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
     r"replay .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
-    r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
+    r"replay .*--pose-source depth-camera": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
     r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
@@ -50,7 +50,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
     r"noise card ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
-    r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
+    r"replay stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; replays of other pages run",
 }
 """Commands that are not run, by how they begin, and why."""
 

@@ -166,7 +166,7 @@ def test_many_environments_and_a_history() -> None:
     [
         ({"operation": 3}, "operation 3"),
         ({"shift_mm": -1.0}, "shift_mm"),
-        ({"corrector": "oracle+feel"}, "give what is before it"),
+        ({"corrector": "oracle+probe"}, "give what is before it"),
         ({"corrector": "orcale"}, "did you mean 'oracle'"),
         ({"residual": "no"}, "residual of APOInsert must be True or False, got 'no'"),
         ({"horizon": "a"}, "horizon of APOInsert must be a whole number, got 'a'"),
@@ -183,7 +183,7 @@ def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
     with pytest.raises(InputError, match="seven numbers"):
         env.step(np.full(7, 2.0, dtype=np.float32))
     with pytest.raises(InputError, match="option of reset"):
-        env.reset(options={"level": 2})
+        env.reset(options={"noise_level": 2})
     with pytest.raises(InputError, match="seven numbers"):
         env.step("forward")  # type: ignore[arg-type]
     for trial in (3.5, "3", True, float("nan"), [1], -1):

@@ -21,16 +21,16 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObservation
 
 import apo_bench
-from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
+from apo_bench import Correction, InputError, Observation, Scene, TrialConfig, correct, run_trial
 from apo_bench.assembly import Outcome, Step
 from apo_bench.envs import episode, starts
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import outcomes
 from apo_bench.simulation.execution import controller as replays
-from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, reobservations_of, simulate_demonstration
 
 SEED = 5
 REPLAY = "apo_bench.envs.starts.replay_and_judge"
@@ -52,8 +52,8 @@ def small() -> APOReplay:
 
 
 @cache
-def demonstrated(scene: Scene, careless: float, seed: int, eye: str) -> SimulatedDemonstration:
-    return simulate_demonstration(scene, careless, seed, eye)
+def demonstrated(scene: Scene, human_error_scale: float, seed: int, pose_source: str) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, human_error_scale, seed, pose_source)
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
 
 def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
     """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
-    row = run_trial(TrialSettings("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
+    row = run_trial(TrialConfig("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
     assert row["success"] is True
     _check_episode(apo_bench.Corrected(small, "paper"), row)
     reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in small._rendering.poses.items()}
@@ -119,9 +119,9 @@ def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
 
 
 def test_an_episode_that_fails_is_the_row_of_its_trial() -> None:
-    """Zeros, bare, are method `none`; at this level the plan is refused before the arm moves."""
-    env = APOReplay("block_on_block", grasp="weld", level=40)
-    spec = TrialSettings("block_on_block", level_mm=40.0, level_deg=40.0, grasp="weld", method="none", seed=SEED)
+    """Zeros, bare, are method `uncorrected`; at this level the plan is refused before the arm moves."""
+    env = APOReplay("block_on_block", grasp="weld", noise_level=40)
+    spec = TrialConfig("block_on_block", noise_mm=40.0, noise_deg=40.0, grasp="weld", method="uncorrected", seed=SEED)
     row = run_trial(spec, env._scene)
     assert row["success"] is False
     _check_episode(env, row)
@@ -136,7 +136,7 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
     code = row["failure_code"] or "ok"
     assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
     assert info["operation"] == row["failure_operation"]
-    assert info["predicted"] == row["predicted"]
+    assert info["failure_prediction"] == row["failure_prediction"]
 
 
 def test_an_action_moves_each_goal_in_the_frame_of_its_part(
@@ -189,13 +189,13 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
             return correct(seen, "contact")
 
     again: list[Observation] = []
-    made = APOReplay("block_on_block", grasp="weld", noise="outliers", looks=2)
+    made = APOReplay("block_on_block", grasp="weld", noise="outliers", max_reobservations=2)
     monkeypatch.setattr(episode, "simulate_demonstration", demonstrated)
     corrected = apo_bench.Corrected(made, Asks())
     corrected.reset(seed=SEED)
     assert again[0].seen.tolist() == [False, bool(again[0].seen[1])]
     assert not np.array_equal(again[0].goals[1], made.seen.goals[1])
-    assert (made.look.left, made.look.seen_again) == (1, 1)
+    assert (made.look.left, made.look.reobservations) == (1, 1)
     copied = copy.deepcopy(made)
     second = made.look([0, 1])
     np.testing.assert_array_equal(copied.look([0]).goals, second.goals)
@@ -204,7 +204,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
     corrected.reset(seed=SEED)
     np.testing.assert_array_equal(again[1].goals, again[0].goals)
     simulated = demonstrated(made._scene, 1.0, SEED, "noise")
-    look = looks_at(simulated, make_noise("outliers", Level(1.0, 1.0)), SEED, 1)
+    look = reobservations_of(simulated, make_noise("outliers", NoiseLevel(1.0, 1.0)), SEED, 1)
     np.testing.assert_array_equal(look([1]).goals, again[0].goals)
 
 
@@ -216,7 +216,7 @@ def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch
     np.testing.assert_array_equal(seen["goals"], pose.pack(watched.seen.goals))
     _, reward, terminated, _, info = corrected.step(zeros(watched))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "correct", "inconsistent")
-    assert "predicted" not in info
+    assert "failure_prediction" not in info
 
 
 def rebuilds(seen: Observation) -> Correction:
@@ -254,22 +254,24 @@ def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
     endings = [
         {
             "operation": nullable(k),
-            "predicted": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x}),
+            "failure_prediction": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x}),
         }
         for k, x in ((3, 1.5), (None, None))
     ]
     for order in (endings, endings[::-1]):
         infos = many._add_info(many._add_info({}, order[0], 0), order[1], 1)
         assert infos["operation"].tolist() == [info["operation"] for info in order]
-        assert infos["predicted"]["size_mm"].tolist() == [info["predicted"]["size_mm"] for info in order]
+        assert infos["failure_prediction"]["size_mm"].tolist() == [
+            info["failure_prediction"]["size_mm"] for info in order
+        ]
 
 
 def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     _, first = watched.reset(seed=SEED)
     _, _, _, _, info = watched.step(np.full((3, 6), 0.05))
-    said = info.pop("predicted")
+    said = info.pop("failure_prediction")
     assert set(said) == {"fails", "operation", "code", "size_mm"}
-    assert 0.0 <= info.pop("promised") <= 1.0
+    assert 0.0 <= info.pop("predicted_success") <= 1.0
     verdicts = {"is_success", "success", "as_demonstrated", "loose_success"}
     assert set(info) == verdicts | {"stage", "code", "operation", "sentence"}
     assert set(first) == {"demonstration"}
@@ -320,10 +322,10 @@ def test_an_action_outside_the_space_is_refused(watched: APOReplay, action: Any)
 
 def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
     from apo_bench.perception.observation.models.isotropic import Isotropic
-    from apo_bench.perception.observation.noise import Level
+    from apo_bench.perception.observation.noise import NoiseLevel
 
     def blind(assembly: Any, shown: Any, rng: Any) -> Observation:
-        full = Isotropic(Level(1.0, 1.0))(assembly, shown, rng)
+        full = Isotropic(NoiseLevel(1.0, 1.0))(assembly, shown, rng)
         return Observation(assembly, full.start, full.goals, full.covariance, np.array([True, False]))
 
     env = APOReplay("block_on_block", noise=blind)
@@ -346,9 +348,9 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     real = module.simulate_demonstration
     calls = []
 
-    def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
+    def fails_at_first(scene: Any, human_error_scale: float, seed: int, pose_source: str) -> Any:
         calls.append(seed)
-        shown = real(scene, careless, seed, eye)
+        shown = real(scene, human_error_scale, seed, pose_source)
         if len(calls) > 1:
             return shown
         return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
@@ -377,11 +379,11 @@ def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
 
 
 def test_poses_may_be_measured_in_depth_images() -> None:
-    env = APOReplay("block_on_block", eye="range", level=1.0)
+    env = APOReplay("block_on_block", pose_source="depth-camera", noise_level=1.0)
     first, _ = env.reset(seed=SEED)
     again, _ = env.reset(seed=SEED)
-    drawn, _ = APOReplay("block_on_block", level=1.0).reset(seed=SEED)
-    shown, _ = APOReplay("block_on_block", level=0.0).reset(seed=SEED)
+    drawn, _ = APOReplay("block_on_block", noise_level=1.0).reset(seed=SEED)
+    shown, _ = APOReplay("block_on_block", noise_level=0.0).reset(seed=SEED)
     for key, x in first.items():
         np.testing.assert_array_equal(x, again[key])
     assert first["seen"].all()
@@ -394,10 +396,13 @@ def test_poses_may_be_measured_in_depth_images() -> None:
     ("arguments", "words"),
     [
         ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
-        ({"level": "1"}, "level of APOReplay must be a number or a list"),
-        ({"level": (1, 2, 3)}, "a pair of mm and degrees"),
+        ({"noise_level": "1"}, "level of APOReplay must be a number or a list"),
+        ({"noise_level": (1, 2, 3)}, "a pair of mm and degrees"),
         ({"noise": "isotropc"}, "did you mean 'isotropic'"),
-        ({"fidelity": "contact", "grasp": "weld"}, "the fidelity 'contact' was given together with the grasp 'weld'"),
+        (
+            {"fidelity": "near-contact", "grasp": "weld"},
+            "the fidelity 'near-contact' was given together with the grasp 'weld'",
+        ),
         ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
     ],
 )
@@ -415,7 +420,7 @@ def test_corrected_wraps_only_this_environment(env: APOReplay) -> None:
 
 def test_make_takes_every_argument_and_a_copy_travels() -> None:
     made = gymnasium.make(
-        "APOReplay-v0", scenario="block_on_block", level=(0.5, 0.25), careless=0.0, noise="isotropic", grasp="weld",
+        "APOReplay-v0", scenario="block_on_block", noise_level=(0.5, 0.25), human_error_scale=0.0, noise="isotropic", grasp="weld",
         clearance_mm=0.4, arm="six_axis", render_mode=None,
     )  # fmt: skip
     seen, _ = made.reset(seed=1)
@@ -451,8 +456,8 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
         return true(*args, **more)
 
     monkeypatch.setattr(REPLAY, replay_and_judge)
-    row = run_trial(TrialSettings("block_on_block", fidelity="contact", method="none", seed=SEED))
-    made = APOReplay("block_on_block", fidelity="contact")
+    row = run_trial(TrialConfig("block_on_block", fidelity="near-contact", method="uncorrected", seed=SEED))
+    made = APOReplay("block_on_block", fidelity="near-contact")
     made.reset(seed=SEED)
     *_, info = made.step(zeros(made))
     assert (asked, info["code"]) == (["contact"], "ok")
@@ -460,8 +465,8 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_what_evaluation_tools_pass_is_no_option(small: APOReplay) -> None:
-    first, _ = small.reset(seed=SEED, options={"lerobot_new_rollout": True, "level": 2.0})
-    again, _ = small.reset(seed=SEED, options={"level": 2.0})
+    first, _ = small.reset(seed=SEED, options={"lerobot_new_rollout": True, "noise_level": 2.0})
+    again, _ = small.reset(seed=SEED, options={"noise_level": 2.0})
     np.testing.assert_array_equal(first["goals"], again["goals"])
 
 

@@ -150,7 +150,7 @@ def test_the_end_is_replayed_with_everything_that_was_undone(monkeypatch: pytest
     *_, reward, _, _, info = act(env, FINISH)
     assert aimed[0][1] == [Step(0), Step(0, undo=True), *map(Step, range(len(env.placed)))]
     assert (reward, info["is_success"], info["code"]) == (1.0, True, "ok")
-    assert {"predicted", "promised"} <= info.keys()
+    assert {"failure_prediction", "predicted_success"} <= info.keys()
     assert act(other, FINISH)[1] == reward
 
 

@@ -17,7 +17,7 @@ from apo_bench import Correction, InputError, Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import as_seen_entries
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 
 SEED = 5
 WAYS: dict[str, Callable[[Any], Any]] = {
@@ -46,10 +46,12 @@ def same(a: Any, b: Any) -> bool:
     return np.array_equal(a, b)
 
 
-@pytest.mark.parametrize(("way", "level"), [("pickle", 0.5), ("cloudpickle", 40.0)])
-def test_a_copy_goes_on_as_the_original_would(way: str, level: float) -> None:
+@pytest.mark.parametrize(("way", "noise_level"), [("pickle", 0.5), ("cloudpickle", 40.0)])
+def test_a_copy_goes_on_as_the_original_would(way: str, noise_level: float) -> None:
     """Before the first reset, between reset and step, and after the step; at level 40 the arm does not move."""
-    made = gymnasium.make("APOReplay-v0", scenario=SMALL, level=level, grasp="weld", render_mode="rgb_array")
+    made = gymnasium.make(
+        "APOReplay-v0", scenario=SMALL, noise_level=noise_level, grasp="weld", render_mode="rgb_array"
+    )
     env = apo_bench.Corrected(made, "paper")
     fresh = WAYS[way](env)
     begun = env.reset(seed=SEED)
@@ -70,7 +72,7 @@ def test_a_copy_goes_on_as_the_original_would(way: str, level: float) -> None:
 def test_a_copy_is_one_of_its_own(env: APOReplay) -> None:
     kept = env.seen.goals.copy()
     other = copy.deepcopy(env)
-    other.reset(seed=SEED + 1, options={"level": 3.0, "clearance_mm": 0.5})
+    other.reset(seed=SEED + 1, options={"noise_level": 3.0, "clearance_mm": 0.5})
     assert (env.trial, other.trial) == (SEED, SEED + 1)
     assert env._scene.clearance_mm != other._scene.clearance_mm
     np.testing.assert_array_equal(env.seen.goals, kept)
@@ -99,7 +101,7 @@ def test_a_correction_can_be_pickled() -> None:
 @pytest.mark.parametrize("name", ["camera", "swaps", "megapose-lmo"])
 def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
     assert env._episode is not None
-    noise = make_noise(name, Level(1.0, 1.0))
+    noise = make_noise(name, NoiseLevel(1.0, 1.0))
     here, there = (
         model(env.assembly, env._episode.simulated.demonstration, np.random.default_rng(1))
         for model in (noise, pickle.loads(pickle.dumps(noise)))
@@ -109,15 +111,15 @@ def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
 
 def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> None:
     """The depth images of the demonstration, tens of megabytes, are gone when the poses are measured."""
-    env = APOReplay(SMALL, eye="range", level=1.0)
+    env = APOReplay(SMALL, pose_source="depth-camera", noise_level=1.0)
     usual = env.reset(seed=SEED)
     pickled = pickle.dumps(env)
     assert len(pickled) < 2e6
-    worse = pickle.loads(pickled).reset(seed=SEED, options={"level": 3})
-    assert same(worse, APOReplay(SMALL, eye="range", level=3).reset(seed=SEED))
+    worse = pickle.loads(pickled).reset(seed=SEED, options={"noise_level": 3})
+    assert same(worse, APOReplay(SMALL, pose_source="depth-camera", noise_level=3).reset(seed=SEED))
     assert not same(worse, usual)
     with pytest.raises(InputError, match="one number is allowed, mm per ray"):
-        env.reset(options={"level": (1, 1)})
+        env.reset(options={"noise_level": (1, 1)})
 
 
 def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,14 +134,14 @@ def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
             raise TypeError("a window cannot be pickled")
 
     monkeypatch.setattr("apo_bench.simulation.scene.render.ReplayWindow", Window)
-    env = APOReplay(SMALL, grasp="weld", level=40, render_mode="human")
+    env = APOReplay(SMALL, grasp="weld", noise_level=40, render_mode="human")
     env.reset(seed=SEED)
     env.step(NEAR)
     assert env._rendering.window is not None
     assert WAYS["deepcopy"](env)._rendering.window is None
 
 
-@pytest.mark.parametrize("options", [{"level": (0.5, 0.25), "careless": 0}, {"clearance_mm": 0.5}])
+@pytest.mark.parametrize("options", [{"noise_level": (0.5, 0.25), "human_error_scale": 0}, {"clearance_mm": 0.5}])
 def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> None:
     """It is that of an environment which was made with them, and the next one is as ever."""
     other = copy.deepcopy(env)
@@ -154,10 +156,10 @@ def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> 
     ("options", "words"),
     [
         ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'level'. Known: careless, clearance_mm, level"),
-        ([("level", 1)], "a dict with level, careless, clearance_mm is allowed"),
-        ({"level": None}, "the level None was given"),
-        ({"level": 2, "careless": 11}, "carelessness of 11"),
-        ({"level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
+        ([("noise_level", 1)], "a dict with level, careless, clearance_mm is allowed"),
+        ({"noise_level": None}, "the level None was given"),
+        ({"noise_level": 2, "human_error_scale": 11}, "carelessness of 11"),
+        ({"noise_level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
     ],
 )
 def test_wrong_options_are_refused_and_change_nothing(env: APOReplay, options: Any, words: str) -> None:
@@ -191,10 +193,10 @@ def test_environments_work_in_spawned_processes() -> None:
     many = gymnasium.make_vec("APOReplay-v0", 2, "async", {"context": "spawn"}, scenario=SMALL, grasp="weld")
     env = APOReplay(SMALL, grasp="weld")
     try:
-        seen, infos = many.reset(seed=[SEED, SEED + 1], options={"level": 2.0})
+        seen, infos = many.reset(seed=[SEED, SEED + 1], options={"noise_level": 2.0})
         assert "trial" not in infos
         for i in range(2):
-            mine, _ = env.reset(seed=SEED + i, options={"level": 2.0})
+            mine, _ = env.reset(seed=SEED + i, options={"noise_level": 2.0})
             np.testing.assert_array_equal(seen["goals"][i], mine["goals"])
         assert many.get_attr("trial") == (SEED, SEED + 1)
     finally:

@@ -33,7 +33,9 @@ def nothing_to_draw_with(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def short() -> gymnasium.Env[Any, Any]:
-    return gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0, grasp="weld")
+    return gymnasium.make(
+        "APOReplay-v0", scenario="block_on_block", noise_level=0.0, human_error_scale=0.0, grasp="weld"
+    )
 
 
 def inserted() -> gymnasium.Env[Any, Any]:
@@ -167,7 +169,7 @@ def test_noise_of_actions_by_dm_control_is_the_same_for_a_seed() -> None:
     assert 0.0 < np.abs(lasts[0]).max() <= 1.0
 
 
-DRAWN = """
+MATCHED = """
 from unittest import mock
 import gymnasium, numpy as np
 from apo_bench.envs import to_dm_env
@@ -198,7 +200,7 @@ def test_viewer_and_wrappers_of_dm_control_that_draw_and_measure() -> None:
     """In a process without a display; 50 steps of physics are one of the environment."""
     kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "PYOPENGL_PLATFORM")}
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", DRAWN],
+        [sys.executable, "-W", "ignore", "-c", MATCHED],
         env={**kept, "MUJOCO_GL": "egl"},
         capture_output=True,
         text=True,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench import TrialSettings
+from apo_bench import TrialConfig
 from apo_bench.envs.policies import expert, insert_env, straight
 
 
 def test_the_teacher_goes_where_the_part_really_has_to_go() -> None:
-    env = insert_env(TrialSettings("stick_in_tower", method="contact-robust", level_mm=1.0, level_deg=1.0))
+    env = insert_env(TrialConfig("stick_in_tower", method="contact-robust", noise_mm=1.0, noise_deg=1.0))
     seen, _ = env.reset(options={"trial": 3})
     for _ in range(2):
         seen, *_ = env.step(np.array([1, 1, -1, 0, 0, 1, -1], dtype=np.float32))
@@ -23,12 +23,12 @@ def test_the_teacher_goes_where_the_part_really_has_to_go() -> None:
 
 
 def test_a_robot_that_is_right_by_its_settings_gets_the_usual_error_of_the_environment() -> None:
-    wrong = {error: insert_env(TrialSettings("block_on_block", robot_error=error)).spec for error in ("none", "tool:1")}
+    wrong = {error: insert_env(TrialConfig("block_on_block", robot_error=error)).spec for error in ("none", "tool:1")}
     assert [spec.kwargs["robot_error"] for spec in wrong.values() if spec] == ["hand_eye:0.5/0.1", "tool:1"]
 
 
 def test_what_is_carried_has_to_go_where_it_belongs_too() -> None:
     """Two cubes on a stick go into two pockets: the stick is off by millimetres, not by the way from cube to cube."""
-    env = insert_env(TrialSettings("pocket_table", level_mm=1.0, level_deg=1.0))
+    env = insert_env(TrialConfig("pocket_table", noise_mm=1.0, noise_deg=1.0))
     env.reset(options={"trial": 0})
     assert np.linalg.norm(env.off[:2]) < 5e-3

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from apo_bench import TrialSettings, run_trial
+from apo_bench import TrialConfig, run_trial
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
@@ -23,23 +23,23 @@ def test_an_episode_promises_what_its_trial_promises() -> None:
     env = Corrected(APOReplay(SCENARIO, robot_error="tool:0.2"))
     env.reset(seed=SEED)
     *_, info = env.step(zeros(env))
-    row = run_trial(TrialSettings(SCENARIO, seed=SEED, robot_error="tool:0.2"))
-    assert info["promised"] == row["promised"]
+    row = run_trial(TrialConfig(SCENARIO, seed=SEED, robot_error="tool:0.2"))
+    assert info["predicted_success"] == row["predicted_success"]
 
 
 def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     from apo_bench.envs import starts
 
     monkeypatch.setattr(starts, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
-    env = Corrected(APOReplay(SCENARIO, abstain=1.0))
+    env = Corrected(APOReplay(SCENARIO, min_predicted_success=1.0))
     env.reset(seed=SEED)
     _, reward, terminated, _, info = env.step(zeros(env))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "promise", "abstained")
-    assert info["promised"] < 1.0
+    assert info["predicted_success"] < 1.0
 
 
 def test_a_probability_is_needed() -> None:
     with pytest.raises(InputError, match=r"a promise to abstain below of 1\.5 was given; a number from 0 to 1"):
-        APOReplay(SCENARIO, abstain=1.5)
+        APOReplay(SCENARIO, min_predicted_success=1.5)
     with pytest.raises(InputError, match="abstain of APOReplay must be a number, got True"):
-        APOReplay(SCENARIO, abstain=True)
+        APOReplay(SCENARIO, min_predicted_success=True)

@@ -21,7 +21,7 @@ from tests import bop_made as made_of
 from tests.bop_made import HEADER, Known, Made
 
 ONE = "1 0 0 0 1 0 0 0 1"
-ROW = f"1,7,3,0.5,{ONE},10 20 900,0.1"
+RECORD_SCHEMA = f"1,7,3,0.5,{ONE},10 20 900,0.1"
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
     turned = "0 -1 0 1 0 0 0 0 1"
     path = tmp_path / "a.csv"
     path.write_bytes(
-        b"\xef\xbb\xbf" + f"{HEADER}\r\n\r\n{ROW}\r\n 2 , 8,4,1e-3,{turned}, -1.5  2e2 1000,-1\r\n".encode()
+        b"\xef\xbb\xbf" + f"{HEADER}\r\n\r\n{RECORD_SCHEMA}\r\n 2 , 8,4,1e-3,{turned}, -1.5  2e2 1000,-1\r\n".encode()
     )
     read = read_results(path)
     assert_array_equal(read.where, [[1, 7, 3], [2, 8, 4]])
@@ -144,14 +144,26 @@ def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path
 
 BAD = {
     "empty": ([], "the file is empty; its first line is scene_id,im_id"),
-    "missing column": ([HEADER.replace(",time", ""), ROW], "line 1: the columns are scene_id.*; needed are scene_id"),
+    "missing column": (
+        [HEADER.replace(",time", ""), RECORD_SCHEMA],
+        "line 1: the columns are scene_id.*; needed are scene_id",
+    ),
     "semicolons": ([HEADER.replace(",", ";")], "line 1: .* by commas; this file uses ';', so save"),
-    "text": ([HEADER, ROW.replace("900", "far")], "line 2: could not convert string to float: 'far'"),
-    "nan": ([HEADER, ROW, ROW.replace("900", "nan")], "line 3: scene, image .* at most 1e"),
+    "text": ([HEADER, RECORD_SCHEMA.replace("900", "far")], "line 2: could not convert string to float: 'far'"),
+    "nan": ([HEADER, RECORD_SCHEMA, RECORD_SCHEMA.replace("900", "nan")], "line 3: scene, image .* at most 1e"),
     "swapped": ([HEADER, f"1,7,3,0.5,10 20 900,{ONE},0.1"], "line 2: score, R, t and time are 1, 9, 3 and 1 numbers"),
-    "not a rotation": ([HEADER, ROW, f"1,8,3,0.5,{ONE[:-1]}2,1 2 900,1"], "line 3, R: a rotation .* identity by 3"),
-    "metres": ([HEADER, ROW.replace("10 20 900", "0.01 0.02 0.9")], "line 2, t: millimetres .* multiply by 1000"),
-    "twice": ([HEADER, ROW, ROW.replace("7", "8"), ROW], "line 4: an earlier row stands there once more"),
+    "not a rotation": (
+        [HEADER, RECORD_SCHEMA, f"1,8,3,0.5,{ONE[:-1]}2,1 2 900,1"],
+        "line 3, R: a rotation .* identity by 3",
+    ),
+    "metres": (
+        [HEADER, RECORD_SCHEMA.replace("10 20 900", "0.01 0.02 0.9")],
+        "line 2, t: millimetres .* multiply by 1000",
+    ),
+    "twice": (
+        [HEADER, RECORD_SCHEMA, RECORD_SCHEMA.replace("7", "8"), RECORD_SCHEMA],
+        "line 4: an earlier row stands there once more",
+    ),
     "not text": (["\udcff"], "line 1: this is not UTF-8 text"),
 }
 
@@ -189,14 +201,14 @@ def test_malformed_truth_is_refused_with_the_entry(document: Any, message: str, 
     path = tmp_path / "scene_gt.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(InputError, match=message):
-        read_truth(path, read_results(written(tmp_path, HEADER, ROW)), 1)
+        read_truth(path, read_results(written(tmp_path, HEADER, RECORD_SCHEMA)), 1)
 
 
 @pytest.mark.parametrize("case", ["missing column", "empty"])
 def test_the_command_ends_with_2_and_one_sentence(
     case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    good = written(tmp_path, HEADER, ROW)
+    good = written(tmp_path, HEADER, RECORD_SCHEMA)
     bad = written(tmp_path, *BAD[case][0], name="bad.csv")
     if case == "empty":
         bad.write_text("", encoding="utf-8")

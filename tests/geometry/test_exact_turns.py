@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
-from apo_bench.perception.observation.models.facts import Level
+from apo_bench.perception.observation.models.facts import NoiseLevel
 from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
 from apo_bench.trial.outcome_columns import goal_errors
 from tests import scenes
@@ -124,8 +124,10 @@ def pinned():
     given, at, _ = CONTACTS["shaft in hole"]
     assembly, start, truth = scene(given, at=at)
     demonstration = shown("block_on_block")[2]
-    careless = np.zeros((2, 6, 6))
-    return assembly, replace(demonstration, assembly=assembly, start=start, goals=truth, final=start, careless=careless)
+    human_error_scale = np.zeros((2, 6, 6))
+    return assembly, replace(
+        demonstration, assembly=assembly, start=start, goals=truth, final=start, human_error_scale=human_error_scale
+    )
 
 
 def test_noise_turns_a_part_of_revolution_about_its_axis_as_it_states():
@@ -133,13 +135,13 @@ def test_noise_turns_a_part_of_revolution_about_its_axis_as_it_states():
     turned = []
     stated = []
     for seed in range(200):
-        seen = Symmetric(Level(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
+        seen = Symmetric(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.goals) @ demonstration.goals)
         turned.append(xi[1, 3:])
         stated.append(np.diag(seen.covariance[1])[3:])
     assert np.degrees(np.std(turned, axis=0)) == pytest.approx([1.0, 1.0, 3.0], rel=0.15)
     assert np.sqrt(np.mean(stated, axis=0)) == pytest.approx(np.std(turned, axis=0), rel=0.15)
-    any_turn = AnyTurn(Level(1.0, 1.0))(assembly, demonstration, np.random.default_rng(0))
+    any_turn = AnyTurn(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(0))
     off = pose.inverse(any_turn.goals[1]) @ demonstration.goals[1]
     assert abs(np.arctan2(off[1, 0], off[0, 0])) > 0.1
 

@@ -211,7 +211,7 @@ def test_worst_numbers() -> None:
         TOWER(), [shift("castle2", 2, 0, 0.3, 0), shift("castle1", 3, 0.5, 0, 0), state(2, penetration_m=2e-5)]
     )
     assert found.gap_mm == pytest.approx(0.3)
-    assert found.pushed_mm == pytest.approx(0.5)
+    assert found.displaced_mm == pytest.approx(0.5)
     assert found.penetration_mm == pytest.approx(0.02)
     assert found.angle_deg == pytest.approx(0.0, abs=1e-5)
     assert found.overlap == pytest.approx(59.5 * 19.7 / (60 * 20))
@@ -239,7 +239,7 @@ def test_clearance_and_thresholds_count() -> None:
     aside = [shift("stick", 3, 0, 0.45, 0)]
     assert not verdict(TOWER(), aside).success
     assert verdict(TOWER(), aside, Thresholds(fit_margin_mm=0.21)).success
-    assert shown(TOWER(), [shift("castle1", 3, 0, 2, 0)], Thresholds(pushed_mm=3.0)).code == "gap"
+    assert shown(TOWER(), [shift("castle1", 3, 0, 2, 0)], Thresholds(displaced_mm=3.0)).code == "gap"
     tighter_than_strict = Thresholds(loose_gap_mm=0.01)
     assert shown(TOWER(), [shift("stick", 3, 0, 0.2, 0)], tighter_than_strict).code == "gap"
     assert shown(TOWER(), [shift("stick", 3, -150, 0, 0)], Thresholds(overlap_fraction=0.0)).code == "overlap"
@@ -263,7 +263,7 @@ THRESHOLDS = st.builds(
     fit_margin_mm=st.floats(0.0, 50.0),
     support_mm=st.floats(0.0, 50.0),
     overlap_fraction=st.floats(0.0, 1.0),
-    pushed_mm=st.floats(0.0, 50.0),
+    displaced_mm=st.floats(0.0, 50.0),
     loose_gap_mm=st.floats(0.0, 10.0),
     loose_angle_deg=st.floats(0.0, 90.0),
 )
@@ -300,7 +300,7 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
             there.assembly, Reached(tuple(states), states[-1]), there.goals, Criteria(Thresholds(), CLEARANCE_MM)
         )
         found = (both.demonstrated, both.finished)
-        numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.pushed_mm)])
+        numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.displaced_mm)])
     assert numbers[0] == pytest.approx(numbers[1], abs=1e-6)
 
 
@@ -319,7 +319,7 @@ def test_a_tower_that_is_turned_after_it_was_built_is_right_but_not_as_demonstra
     turn = [lambda states: states[END].update({p: LAYOUT @ about @ pose.inverse(LAYOUT) @ states[END][p] for p in ALL})]
     found = verdict(TOWER(), turn)
     assert (found.success, found.as_demonstrated, found.demonstrated.code) == (True, False, "pushed")
-    assert found.finished.pushed_mm == pytest.approx(9.64, abs=0.01)
+    assert found.finished.displaced_mm == pytest.approx(9.64, abs=0.01)
     assert "stick by 9.64 mm" in found.demonstrated.why
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.sweeps.worker import timing
-from apo_bench.records import REQUIRED, ROW_FIELDS
+from apo_bench.records import RECORD_FIELDS, REQUIRED
 from apo_bench.records.run.validation import TIMING_FIELDS, row_of, timing_of, unwritable
 from apo_bench.trial.outcome_columns import lost, misbehaved
 
-SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
+SPEC = TrialConfig("block_on_block", noise_mm=3.0, noise_deg=2.0, method="paper", seed=2)
 
 
 @pytest.fixture(scope="module")
@@ -29,14 +29,14 @@ def made() -> list[dict[str, Any]]:
 
 def test_every_field_of_a_row_is_in_the_table(made: list[dict[str, Any]]) -> None:
     for row in made:
-        assert set(ROW_FIELDS) == set(row)
+        assert set(RECORD_FIELDS) == set(row)
         assert unwritable(row) == ""
 
 
 def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
     for row in made:
         line = json.dumps(row, allow_nan=False).encode()
-        assert row_of(line, "line 1") == dict.fromkeys(ROW_FIELDS) | row
+        assert row_of(line, "line 1") == dict.fromkeys(RECORD_FIELDS) | row
         times = timing(row, None, 0.1, 0.2, {"worker": 0})
         assert timing_of(json.dumps(times).encode(), "line 1") == times
         assert set(times) == set(TIMING_FIELDS)
@@ -68,10 +68,10 @@ def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pyte
     from apo_bench.trial.stages import simulate_demonstration
 
     scene = build_scene(load_scenario("block_on_block"))
-    shown = simulate_demonstration(scene, SPEC.careless, SPEC.seed)
+    shown = simulate_demonstration(scene, SPEC.human_error_scale, SPEC.seed)
     right = run_trial(SPEC, scene, simulated=shown)
     monkeypatch.setattr(trial, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
-    mine = TrialSettings("block_on_block", method="mine:correct")
+    mine = TrialConfig("block_on_block", method="mine:correct")
     row = trial.trial_row(mine, scene, shown, "0")
     assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
     assert "returned what no row can hold (field p_value:" in row["sentence"]

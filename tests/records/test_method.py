@@ -2,39 +2,39 @@
 
 import pytest
 
-from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario
+from apo_bench import InputError, SweepConfig, TrialConfig, load_scenario
 from apo_bench.assembly import LookingCorrector
 from apo_bench.benchmark.analysis import rank
 from apo_bench.benchmark.sweeps.grid import units
 from apo_bench.names import resolve
-from apo_bench.records import CORRECTORS, feels, knows_relations, knows_truth, may_look, parsed
+from apo_bench.records import CORRECTORS, knows_truth, may_reobserve, parse_method, probes, uses_contacts
 from apo_bench.records.short_names import checked_method
 
 
 @pytest.mark.parametrize(
-    ("name", "plan", "searches", "by_touch"),
+    ("name", "plan", "spiral", "probe"),
     [
-        ("search", "none", True, False),
-        ("none+feel", "none", True, True),
-        ("contact+feel", "contact", True, True),
-        ("mine:correct+feel", "mine:correct", True, True),
+        ("spiral-search", "uncorrected", True, False),
+        ("uncorrected+probe", "uncorrected", True, True),
+        ("contact+probe", "contact", True, True),
+        ("mine:correct+probe", "mine:correct", True, True),
         ("mine:search", "mine:search", False, False),
     ],
 )
-def test_a_name_has_a_plan_and_what_the_robot_does_besides(name, plan, searches, by_touch):
-    assert parsed(checked_method(name)) == (plan, searches, by_touch)
+def test_a_name_has_a_plan_and_what_the_robot_does_besides(name, plan, spiral, probe):
+    assert parse_method(checked_method(name)) == (plan, spiral, probe)
 
 
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("contact+search+search", "said once"),
+        ("contact+spiral+spiral", "said once"),
         (
-            "contact+search+feel",
+            "contact+spiral+probe",
             "'contact.search.feel' was given; one of .search and .feel, which searches too, is said",
         ),
-        ("foo+feel", "unknown method 'foo'"),
-        ("+search", r"unknown method '\+search'; did you mean 'search'\?"),
+        ("foo+probe", "unknown method 'foo'"),
+        ("+spiral", r"unknown method '\+spiral'; did you mean 'spiral-search'\?"),
         ("contact+searchh", "unknown method"),
     ],
 )
@@ -44,67 +44,74 @@ def test_a_wrong_name_is_refused(name, said):
 
 
 def test_one_method_has_one_name():
-    assert TrialSettings("stick_in_tower", method="none+search").method == "search"
-    assert SweepSettings(("stick_in_tower",), methods=("search", "none+search", "none")).methods == ("search", "none")
-    assert TrialSettings("stick_in_tower", method="none+feel").method == "none+feel"
+    assert TrialConfig("stick_in_tower", method="uncorrected+spiral").method == "spiral-search"
+    assert SweepConfig(("stick_in_tower",), method=("spiral-search", "uncorrected+spiral", "uncorrected")).method == (
+        "spiral-search",
+        "uncorrected",
+    )
+    assert TrialConfig("stick_in_tower", method="uncorrected+probe").method == "uncorrected+probe"
 
 
 def test_what_a_method_meets_is_that_of_its_plan():
-    for robot in ("search", "feel"):
-        methods = (f"oracle+{robot}", f"none+{robot}", f"paper+{robot}")
+    for robot in ("spiral-search", "feel"):
+        methods = (f"oracle+{robot}", f"uncorrected+{robot}", f"paper+{robot}")
         assert [knows_truth(m) for m in methods] == [True, False, False]
-        assert [knows_relations(m) for m in methods] == [False, False, True]
-    assert [feels(m) for m in ("paper+feel", "paper+search", "paper")] == [True, False, False]
+        assert [uses_contacts(m) for m in methods] == [False, False, True]
+    assert [probes(m) for m in ("paper+probe", "paper+spiral", "paper")] == [True, False, False]
     ranked = [
         "oracle",
-        "oracle+feel",
-        "none",
-        "none+feel",
-        "search",
+        "oracle+probe",
+        "uncorrected",
+        "uncorrected+probe",
+        "spiral-search",
         "contact",
-        "contact+feel",
-        "contact+search",
+        "contact+probe",
+        "contact+spiral",
         "paper",
         "paper-track",
         "snap",
-        "snap+search",
+        "snap+spiral",
     ]
     assert sorted(ranked, key=lambda m: (rank(m), m)) == ranked
 
 
 def test_an_oracle_that_searches_runs_once_per_seed():
-    grid = SweepSettings(
-        ("stick_in_tower",), (0.0, 1.0), methods=("oracle+search", "search"), trials=1, relations=("missed",)
+    grid = SweepConfig(
+        ("stick_in_tower",),
+        (0.0, 1.0),
+        method=("oracle+spiral", "spiral-search"),
+        trials=1,
+        contact_source=("false-negative",),
     )
     trials = [t for unit in units([grid], {"stick_in_tower": load_scenario("stick_in_tower")}) for t in unit]
-    asked = [(t.method, t.level_mm, t.careless, t.relations) for t in trials]
-    assert asked.count(("oracle+search", 0.0, 0.0, "given")) == 1
+    asked = [(t.method, t.noise_mm, t.human_error_scale, t.contact_source) for t in trials]
+    assert asked.count(("oracle+spiral", 0.0, 0.0, "given")) == 1
     assert sorted(set(asked)) == sorted(asked)
     assert len(asked) == 5
 
 
 def test_what_a_robot_that_feels_is_given_is_nothing_to_others():
-    grid = SweepSettings(
+    grid = SweepConfig(
         ("stick_in_tower",),
         (1.0,),
         (1.0,),
-        methods=("oracle+feel", "oracle", "contact+feel", "contact"),
+        method=("oracle+probe", "oracle", "contact+probe", "contact"),
         trials=1,
-        wrenches=("cobot", "external"),
-        stated_errors=("unstated", "tool:1.0"),
+        ft_sensor=("joint-torque", "wrist"),
+        assumed_robot_error=("unknown", "tool:1.0"),
     )
     trials = [t for unit in units([grid], {"stick_in_tower": load_scenario("stick_in_tower")}) for t in unit]
-    given = {(t.method, t.wrench, t.stated_error) for t in trials}
-    both = {(wrench, stated) for wrench in ("cobot", "external") for stated in ("unstated", "tool:1")}
+    given = {(t.method, t.ft_sensor, t.assumed_robot_error) for t in trials}
+    both = {(ft_sensor, stated) for ft_sensor in ("joint-torque", "wrist") for stated in ("unknown", "tool:1")}
     assert len(trials) == len(given) == 10
     for plan in ("oracle", "contact"):
-        assert {(wrench, stated) for method, wrench, stated in given if method == f"{plan}+feel"} == both
-        assert (plan, "external", "drawn") in given
+        assert {(ft_sensor, stated) for method, ft_sensor, stated in given if method == f"{plan}+probe"} == both
+        assert (plan, "wrist", "matched") in given
 
 
 def test_methods_that_may_look_are_those_that_can_ask():
     for name in CORRECTORS:
-        assert may_look(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
-    assert may_look("contact-robust+search")
-    assert may_look("mine:correct")
-    assert not any(map(may_look, ("oracle", "none", "search")))
+        assert may_reobserve(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
+    assert may_reobserve("contact-robust+spiral")
+    assert may_reobserve("mine:correct")
+    assert not any(map(may_reobserve, ("oracle", "uncorrected", "spiral-search")))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import InputError
-from apo_bench.records import checked_robot_error, checked_stated_error, robot_sigmas, told_error
+from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_robot_error, robot_sigmas
 from apo_bench.records.robot_error import Sigmas
 
 
@@ -49,8 +49,8 @@ def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("given", "spelled", "told"),
     [
-        ("drawn", "drawn", "tool:0.2"),
-        ("unstated", "unstated", None),
+        ("matched", "matched", "tool:0.2"),
+        ("unknown", "unknown", None),
         ("none", "none", "none"),
         ("tool:0", "none", "none"),
         ("tool:0.50+hand_eye:1.0/0", "hand_eye:1+tool:0.5", "hand_eye:1+tool:0.5"),
@@ -59,18 +59,18 @@ def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
 def test_what_a_robot_is_told_is_what_is_drawn_nothing_or_something_else(
     given: str, spelled: str, told: str | None
 ) -> None:
-    assert checked_stated_error(given) == spelled == checked_stated_error(spelled)
-    assert told_error(spelled, "tool:0.2") == told
+    assert checked_assumed_robot_error(given) == spelled == checked_assumed_robot_error(spelled)
+    assert assumed_error(spelled, "tool:0.2") == told
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("drwan", "unknown stated error 'drwan'; did you mean 'drawn'?"),
+        ("drwan", "unknown stated error 'drwan'; did you mean 'matched'?"),
         ("tool:1+elbow:2", "unknown stated error 'tool:1+elbow:2'"),
     ],
 )
 def test_what_is_no_stated_error_is_one_sentence(given: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
-        checked_stated_error(given)
+        checked_assumed_robot_error(given)
     assert str(refused.value).startswith(said)

@@ -21,14 +21,14 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.assembly import Outcome
-from apo_bench.records import KEY, ROW
+from apo_bench.records import KEY, RECORD_SCHEMA
 from apo_bench.records.run import run_folder
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder, read_rows
 from apo_bench.trial.fingerprint import code_files, versions
 from apo_bench.trial.outcome_columns import result
 
-GRID = {"scenarios": ["block_on_block"], "levels": [1.0], "trials": 60}
+GRID = {"scenarios": ["block_on_block"], "noise_level": [1.0], "trials": 60}
 CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}
 VERSIONS = versions()
 ATTACH = "simulation/execution/attach.py"
@@ -43,12 +43,25 @@ def run(**changed: Any) -> dict[str, Any]:
 
 def row(seed: int) -> dict[str, Any]:
     key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0)
-    key = (*key, "external", "drawn", 0.0, seed)
+    key = (*key, "wrist", "matched", 0.0, seed)
     ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
-    ended |= {"sim_seconds": 20.0, "extra_operations": 0}
+    ended |= {"sim_time_s": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
-    alike = {"env_id": "APOReplay-v0", "arm": "six_axis", "eye": "noise", "timestep_s": 0.001, "fidelity": "full"}
-    return {"schema": ROW, "spec_hash": "ab", **alike, **dict(zip(KEY, key, strict=True)), **ended, "reached": reached}
+    alike = {
+        "env_id": "APOReplay-v0",
+        "arm": "six_axis",
+        "pose_source": "noise-model",
+        "timestep_s": 0.001,
+        "fidelity": "full",
+    }
+    return {
+        "schema": RECORD_SCHEMA,
+        "config_hash": "ab",
+        **alike,
+        **dict(zip(KEY, key, strict=True)),
+        **ended,
+        "reached": reached,
+    }
 
 
 def line(seed: int) -> bytes:
@@ -253,7 +266,7 @@ def test_run_json_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pyt
         ),
         ({"code": {**CODE, "new.py": "1", "a.py": "2"}}, "(code: apo_bench/a.py and 1 more changed)"),
         ({"content": CONTENT | {"method mine:fit": "0"}}, "(inputs changed: method mine:fit)"),
-        ({"grids": [GRID | {"levels": [2.0]}]}, "(grid: levels was [1.0], now [2.0])"),
+        ({"grids": [GRID | {"noise_level": [2.0]}]}, "(grid: levels was [1.0], now [2.0])"),
         ({"grids": [GRID, GRID]}, "(it had 1 grids, now 2)"),
     ],
 )
@@ -292,7 +305,7 @@ def test_a_folder_of_something_else(name: str, text: str, words: str, tmp_path: 
 def test_a_folder_without_rows_is_anybodys(tmp_path: Path) -> None:
     with RunFolder(tmp_path, run()):
         pass
-    with RunFolder(tmp_path, run(grids=[GRID | {"levels": [3.0]}])) as store:
+    with RunFolder(tmp_path, run(grids=[GRID | {"noise_level": [3.0]}])) as store:
         assert not store.finished
 
 

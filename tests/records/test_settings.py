@@ -12,13 +12,23 @@ from typing import get_type_hints
 
 import pytest
 
-from apo_bench import InputError, SweepSettings, TrialSettings, run_trial
+from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.records import KEY, LEVEL, REQUIRED, ROW, ROW_FIELDS, SETTINGS, look_up, setting_columns, settings_of
+from apo_bench.records import (
+    KEY,
+    NOISE_LEVEL,
+    RECORD_FIELDS,
+    RECORD_SCHEMA,
+    REQUIRED,
+    SETTINGS,
+    look_up,
+    setting_columns,
+    settings_of,
+)
 from apo_bench.records.run.run_folder import read_rows
 
 ROOT = Path(__file__).parents[2]
@@ -27,42 +37,44 @@ KEPT = ROOT / "tests" / "kept" / "sweep"
 
 
 def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() -> None:
-    columns = [info.column for info in SETTINGS.values()]
-    assert [column for column in ROW_FIELDS if column in columns] == columns
-    for name, kind in get_type_hints(TrialSettings, include_extras=True).items():
-        column = ROW_FIELDS[SETTINGS[name].column]
-        if not SETTINGS[name].choices and name != "salt":
+    columns = [info.name for info in SETTINGS.values()]
+    assert [column for column in RECORD_FIELDS if column in columns] == columns
+    for name, kind in get_type_hints(TrialConfig, include_extras=True).items():
+        column = RECORD_FIELDS[name]
+        if not SETTINGS[name].choices and name != "secret_seed":
             assert column in (kind, kind | None)
-    assert {*KEY, *columns} - {*REQUIRED} == {"salt"}
+    assert {*KEY, *columns} - {*REQUIRED} == {"secret_seed"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
-    here = {field.name for field in fields(SweepSettings)}
+    here = {field.name for field in fields(SweepConfig)}
     for name, info in SETTINGS.items():
-        level = name.startswith("level_")
-        alone = name in ("seed", "salt")
-        assert bool(info.axis) + info.shared + level + alone == 1
-        assert (LEVEL.axis if level else info.axis or name) in here | {"salt"}
+        noise_level = name.startswith("level_")
+        alone = name in ("seed", "secret_seed")
+        assert bool(info.axis) + info.shared + noise_level + alone == 1
+        assert (NOISE_LEVEL.axis if noise_level else info.axis or name) in here | {"secret_seed"}
         assert not info.axis or info.axis in SWEEP_KEYS
 
 
 def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
     options = {option.name for option in trial_options()}
-    assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"level"}
-    assert {"levels", "methods", "clearance", "timestep_ms", "fidelity"} < {option.name for option in sweep_options()}
+    assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"noise_mm"}
+    assert {"noise_level", "methods", "clearance", "timestep_ms", "fidelity"} < {
+        option.name for option in sweep_options()
+    }
 
 
 def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
-    robot = ["robot_error", "looks", "wrench", "stated_error", "abstain"]
-    assert here == ["careless", "eye", "grasp", "arm", *robot, "timestep_s", "fidelity"]
+    robot = ["robot_error", "max_reobservations", "ft_sensor", "assumed_robot_error", "min_predicted_success"]
+    assert here == ["human_error_scale", "pose_source", "grasp", "arm", *robot, "timestep_s", "fidelity"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
-    assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
+    assert defaults["noise_level"] == TrialConfig.noise_mm == TrialConfig.noise_deg
 
 
 def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
-    made = TrialSettings("block_on_block", 2.0, 0.5, 0.0, 0.5, method="none", seed=3, timestep_s=0.0005)
+    made = TrialConfig("block_on_block", 2.0, 0.5, 0.0, 0.5, method="uncorrected", seed=3, timestep_s=0.0005)
     assert settings_of(setting_columns(made, "block_on_block"), "block_on_block") == made
 
 
@@ -70,12 +82,12 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     ("wrong", "said"),
     [
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
-        ({"wrench": "externall"}, "unknown wrench sensor 'externall'; did you mean 'external'?"),
+        ({"ft_sensor": "externall"}, "unknown wrench sensor 'externall'; did you mean 'wrist'?"),
         (
-            {"grasp": "weld", "method": "oracle+feel"},
+            {"grasp": "weld", "method": "oracle+probe"},
             "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close;",
         ),
-        ({"relations": 1}, "an int was given as relations;"),
+        ({"contact_source": 1}, "an int was given as relations;"),
         ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
         (
             {"clearance_mm": float("inf")},
@@ -85,7 +97,7 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
 )
 def test_a_setting_that_cannot_be_is_one_sentence(wrong: dict[str, object], said: str) -> None:
     with pytest.raises(InputError) as refused:
-        TrialSettings(**{"scenario": "block_on_block", **wrong})  # type: ignore[arg-type]
+        TrialConfig(**{"scenario": "block_on_block", **wrong})  # type: ignore[arg-type]
     assert str(refused.value).startswith(said)
 
 
@@ -95,14 +107,14 @@ def test_a_trial_is_written_as_before() -> None:
         before = json.loads(line)
         again = run_trial(settings_of(before, before["scenario"]))
         assert [column for column in again if column in before] == list(before)
-        same = [info.column for info in SETTINGS.values() if info.column in before]
-        for column in (*same, "success", "failure_stage", "failure_code", "freed"):
+        same = [info.name for info in SETTINGS.values() if info.name in before]
+        for column in (*same, "success", "failure_stage", "failure_code", "corrected_operations"):
             assert look_up(again, column) == before[column]
 
 
 def test_a_folder_that_was_kept_is_reported_and_compared(tmp_path: Path) -> None:
     rows = read_rows(KEPT)
-    assert (len(rows), {row["schema"] for row in rows}) == (24, {ROW})
+    assert (len(rows), {row["schema"] for row in rows}) == (24, {RECORD_SCHEMA})
     for row, line in zip(rows, (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines(), strict=True):
         assert json.dumps(row) == line
     folder = shutil.copytree(KEPT, tmp_path / "kept")
@@ -118,5 +130,5 @@ def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.M
     monkeypatch.delitem(sys.modules, "fields")
     for name in SETTINGS:
         assert f"| `{name}` | " in pages.settings_page()
-    for column in ROW_FIELDS:
+    for column in RECORD_FIELDS:
         assert f"| `{column}` | " in pages.row_page()

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError, Observation, Scenario, correct, load_scenario
 from apo_bench.assembly import Contact, Gap, PartFace
-from apo_bench.perception.observation.relations import Shifted, false, missed
+from apo_bench.perception.observation.wrong_contacts import Shifted, false, missed
 from apo_bench.resources import folder
 
 SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text(encoding="utf-8")

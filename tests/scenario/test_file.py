@@ -77,7 +77,11 @@ BROKEN = {
         "operation = 4",
         ["careless, operation", "from 1 to 3", "4 was given"],
     ),
-    "careless upwards": ('operation = 2\nalong = "y"', 'operation = 2\nalong = "z"', ["careless, along", "level"]),
+    "careless upwards": (
+        'operation = 2\nalong = "y"',
+        'operation = 2\nalong = "z"',
+        ["careless, along", "noise_level"],
+    ),
     "a threshold": ("overlap_fraction = 0.5", "overlap_fraction = 50", ["judge, overlap_fraction", "50 was given"]),
     "no axis": (
         'attach = { along = "+x"',
@@ -172,8 +176,12 @@ def test_what_the_tower_says():
     assert tower.assembly.fixed == {"table"}
     assert tower.goals[1] == pytest.approx(pose.at((0, 0, 0.08), (180, 0, 0)))
     assert tower.start["castle2"] == pytest.approx(pose.at((0.14, -0.29, 0.04), (180, 0, 0)))
-    assert (tower.careless.operation, tower.careless.low_m, tower.careless.high_m) == (1, 0.0015, 0.004)
-    assert tower.careless.axis == pytest.approx((0, 1, 0))
+    assert (tower.human_error.operation, tower.human_error.low_m, tower.human_error.high_m) == (
+        1,
+        0.0015,
+        0.004,
+    )
+    assert tower.human_error.axis == pytest.approx((0, 1, 0))
     assert np.degrees(tower.site.yaw_rad) == pytest.approx((-28, 28))
     assert [(s.operation, s.low_m, s.high_m) for s in tower.shifts] == [(1, -0.004, 0.004), (2, -0.005, 0.005)]
     assert tower.thresholds == Thresholds()
@@ -193,7 +201,7 @@ def test_what_is_left_out_has_a_default(tmp_path: Path):
     plain = load_scenario(path)
     assert plain.name == "plain"
     assert (plain.paper, plain.human, plain.success) == ("", "", "")
-    assert (plain.clearance_mm, plain.gap_mm, plain.careless, plain.shifts) == (0.25, 0.1, None, ())
+    assert (plain.clearance_mm, plain.gap_mm, plain.human_error, plain.shifts) == (0.25, 0.1, None, ())
     assert plain.site.spread_m == (0.0, 0.0)
     assert plain.thresholds == Thresholds()
     assert not plain.colors

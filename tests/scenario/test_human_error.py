@@ -13,13 +13,13 @@ from apo_bench import Layout, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import placements
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.human_error import NOTHING_M, _displaced, careless_covariance, spread_error
-from apo_bench.scenario.scenario import Carelessness
+from apo_bench.scenario.human_error import NOTHING_M, _displaced, human_error_covariance, spread_error
+from apo_bench.scenario.scenario import HumanError
 from tests import rounds
 from tests.scenes import Scene
 
 SCENARIOS = {name: load_scenario(name) for name in scenario_names()}
-CARELESS = sorted(name for name, scenario in SCENARIOS.items() if scenario.careless)
+CARELESS = sorted(name for name, scenario in SCENARIOS.items() if scenario.human_error)
 ALIKE = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}, "gearbox": {5, 6, 7}}
 """Operations, counted from 0, that show the error; elsewhere it is that of the error alone."""
 LEFT = {"pocket_table": ("cube2",), "dovetail": ("base2",), "peg_in_hole": ("plate",)}
@@ -36,10 +36,10 @@ def layout(scenario: Scenario, seed: int = 3) -> Layout:
 @pytest.mark.parametrize("size_m", [-0.004, 0.0015])
 def test_which_operations_show_the_error_and_what_is_left_of_it(name: str, size_m: float):
     scenario = SCENARIOS[name]
-    found = spread_error(scenario, layout(scenario), size_m * scenario.careless.axis)
+    found = spread_error(scenario, layout(scenario), size_m * scenario.human_error.axis)
     expected = np.zeros((len(scenario.assembly), 3))
-    for k in ALIKE.get(name, {scenario.careless.operation}):
-        expected[k] = size_m * scenario.careless.axis
+    for k in ALIKE.get(name, {scenario.human_error.operation}):
+        expected[k] = size_m * scenario.human_error.axis
     assert found.offsets == pytest.approx(expected, abs=1e-15)
     assert found.left == LEFT.get(name, ("castle2",))
 
@@ -75,14 +75,14 @@ def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, 
 @settings(max_examples=20, deadline=None)
 def test_twice_the_error_is_twice_as_far_everywhere(factor: float):
     scenario = SCENARIOS["vanished_fixture"]
-    once, more = (spread_error(scenario, layout(scenario), f * 1e-3 * scenario.careless.axis) for f in (1.0, factor))
+    once, more = (spread_error(scenario, layout(scenario), f * 1e-3 * scenario.human_error.axis) for f in (1.0, factor))
     assert more.offsets == pytest.approx(factor * once.offsets, abs=2e-9)
 
 
 def test_what_stands_on_a_displaced_part_and_moves_with_it_becomes_right_with_it():
     """Example 5.2 with the cube put down wrong: taken up and moved on, it and the stick in it are where they should."""
     scenario = SCENARIOS["carried_bridge"]
-    wrong = replace(scenario, careless=Carelessness(2, np.array([0.0, 1.0, 0.0]), 1e-3, 2e-3))
+    wrong = replace(scenario, human_error=HumanError(2, np.array([0.0, 1.0, 0.0]), 1e-3, 2e-3))
     found = spread_error(wrong, layout(wrong), np.array([0.0, 1e-3, 0.0]))
     assert found.offsets[2] == pytest.approx((0.0, 1e-3, 0.0))
     assert found.offsets[3] == pytest.approx((0.0, 1e-3, 0.0)), "the hole leads the stick"
@@ -93,14 +93,16 @@ def test_what_stands_on_a_displaced_part_and_moves_with_it_becomes_right_with_it
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_covariance_is_the_mean_square_of_every_operation_that_errs(name: str):
     scenario = SCENARIOS[name]
-    covariance = careless_covariance(scenario, 2.0)
+    covariance = human_error_covariance(scenario, 2.0)
     expected = np.zeros_like(covariance)
-    if scenario.careless is not None:
-        square = np.outer(scenario.careless.axis, scenario.careless.axis) * (2.0 * scenario.careless.rms_m) ** 2
-        for k in ALIKE.get(name, {scenario.careless.operation}):
+    if scenario.human_error is not None:
+        square = (
+            np.outer(scenario.human_error.axis, scenario.human_error.axis) * (2.0 * scenario.human_error.rms_m) ** 2
+        )
+        for k in ALIKE.get(name, {scenario.human_error.operation}):
             expected[k, :3, :3] = square
     assert covariance == pytest.approx(expected, abs=1e-18)
-    assert not careless_covariance(scenario, 0.0).any()
+    assert not human_error_covariance(scenario, 0.0).any()
 
 
 def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:
@@ -108,8 +110,8 @@ def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:
     last = replace(scene.assembly.operations[-1], contacts=())
     assembly = replace(scene.assembly, operations=(*scene.assembly.operations, last))
     goals = np.concatenate([scene.goals, scene.goals[-1:]])
-    careless = Carelessness(operation, np.array([1.0, 0.0, 0.0]), 0.0, 0.01)
-    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, careless=careless)
+    human_error = HumanError(operation, np.array([1.0, 0.0, 0.0]), 0.0, 0.01)
+    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, human_error_scale=human_error_scale)
     return spread_error(scenario, Layout(goals, scene.start), offset).offsets[:-1]
 
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import Arm, InputError, TrialSettings, build_scene, load_scenario, read_arm, run_trial
+from apo_bench import Arm, InputError, TrialConfig, build_scene, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.records.run.replay_command import own_code
 from apo_bench.resources import folder
@@ -167,7 +167,7 @@ def test_a_line_takes_as_long_as_the_joints_need() -> None:
 
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: str) -> None:
-    row = run_trial(TrialSettings("block_on_block", method="oracle", fidelity="contact", arm=name))
+    row = run_trial(TrialConfig("block_on_block", method="oracle", fidelity="near-contact", arm=name))
     assert row["success"]
     assert row["joint_control"] == "position servos made from the model"
 
@@ -225,7 +225,9 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
     monkeypatch.setenv("APO_BENCH_ROBOSUITE", str(tmp_path))
     monkeypatch.setenv("APO_BENCH_MENAGERIE", str(tmp_path / "none"))
     assert find_arm("robosuite:UR5e").opening_m == pytest.approx(0.0428, abs=2e-4)
-    assert own_code({"arm": "robosuite:UR5e", "method": "contact", "noise": "isotropic", "relations": "given"}) == ()
+    assert (
+        own_code({"arm": "robosuite:UR5e", "method": "contact", "noise": "isotropic", "contact_source": "given"}) == ()
+    )
     with pytest.raises(InputError, match="unknown arm 'UR9'"):
         find_arm("robosuite:UR9")
     with pytest.raises(InputError, match="fetch it with 'git clone"):

@@ -33,8 +33,8 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> SimulatedDemonstration:
-    return simulate_demonstration(scene(name), careless, seed)
+def shown(name: str, human_error_scale: float, seed: int) -> SimulatedDemonstration:
+    return simulate_demonstration(scene(name), human_error_scale, seed)
 
 
 def off_mm(of: SimulatedDemonstration) -> Array:
@@ -62,18 +62,18 @@ def test_a_careful_human_shows_the_truth(name: str):
 
 
 @pytest.mark.parametrize(
-    ("name", "careless"), [("vanished_fixture", 1.0), ("pocket_table", 1.0), ("nested_bushings", 2.0)]
+    ("name", "human_error_scale"), [("vanished_fixture", 1.0), ("pocket_table", 1.0), ("nested_bushings", 2.0)]
 )
-def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, careless: float):
-    of = shown(name, careless, 2)
+def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, human_error_scale: float):
+    of = shown(name, human_error_scale, 2)
     assert of.demonstration.code == "ok"
-    mistake = load_scenario(name).careless
+    mistake = load_scenario(name).human_error
     k = of.demonstration.assembly.operations[mistake.operation].main
     axis = of.layout.goals[mistake.operation][:2, :2] @ mistake.axis[:2]
     erring = ALIKE.get(name, {mistake.operation})
     for operation, off in enumerate(off_mm(of)):
         if operation in erring:
-            assert 1.5 * careless - LEVEL_MM < abs(off[:2] @ axis) < 4.0 * careless + LEVEL_MM
+            assert 1.5 * human_error_scale - LEVEL_MM < abs(off[:2] @ axis) < 4.0 * human_error_scale + LEVEL_MM
             assert abs(off[0] * axis[1] - off[1] * axis[0]) < LEVEL_MM
         else:
             assert np.abs(off[:2]).max() < LEVEL_MM

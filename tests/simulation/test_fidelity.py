@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, TrialSettings, build_scene, load_scenario, replay, run_trial
+from apo_bench import InputError, Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
@@ -26,24 +26,24 @@ def _scene(name, grasp):
 
 
 @cache
-def _shown(name, grasp, seed, careless):
-    return simulate_demonstration(scene(name, grasp), careless, seed)
+def _shown(name, grasp, seed, human_error_scale):
+    return simulate_demonstration(scene(name, grasp), human_error_scale, seed)
 
 
 def scene(name="stick_in_tower", grasp="friction"):
     return _scene(name, grasp)
 
 
-def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
-    return _shown(name, grasp, seed, careless)
+def shown(name="stick_in_tower", grasp="friction", seed=1, human_error_scale=1.0):
+    return _shown(name, grasp, seed, human_error_scale)
 
 
-def row(method, fidelity, *, grasp="friction", level=1.0, cache=None):
-    spec = TrialSettings("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
+def row(method, fidelity, *, grasp="friction", noise_level=1.0, cache=None):
+    spec = TrialConfig("stick_in_tower", noise_level, noise_level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
     return json.dumps(run_trial(spec, scene(grasp=grasp), simulated=shown(grasp=grasp), cache=cache))
 
 
-ASKED = [("paper-track", 1.0), ("none", 1.0), ("paper", 1.0), ("paper", 0.5), ("paper-track", 1.0)]
+ASKED = [("paper-track", 1.0), ("uncorrected", 1.0), ("paper", 1.0), ("paper", 0.5), ("paper-track", 1.0)]
 
 
 @pytest.mark.parametrize(
@@ -52,17 +52,17 @@ ASKED = [("paper-track", 1.0), ("none", 1.0), ("paper", 1.0), ("paper", 0.5), ("
 )
 def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
     cache = ReplayCache()
-    shared = [row(method, fidelity, grasp=grasp, level=level, cache=cache) for method, level in asked]
-    alone = [row(method, fidelity, grasp=grasp, level=level) for method, level in asked[:-1]]
+    shared = [row(method, fidelity, grasp=grasp, noise_level=level, cache=cache) for method, level in asked]
+    alone = [row(method, fidelity, grasp=grasp, noise_level=level) for method, level in asked[:-1]]
     assert shared == [*alone, alone[0]]
 
 
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     cache = ReplayCache()
     plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals)
-    first = replay(plan, scene(), fidelity="contact", cache=cache)
+    first = replay(plan, scene(), fidelity="near-contact", cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), fidelity="contact", cache=cache) is first
+    assert replay(plan, scene(), fidelity="near-contact", cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():
@@ -132,7 +132,7 @@ def test_contact_simulates_less_and_passes_as_much_time():
     plan = Plan(scene().scenario.assembly, layout.start, layout.goals)
     full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "contact"))
     assert full.outcome.code == contact.outcome.code == "ok"
-    assert contact.sim_seconds == pytest.approx(full.sim_seconds, abs=0.5)
+    assert contact.sim_time_s == pytest.approx(full.sim_time_s, abs=0.5)
     for part, T in full.reached.final.poses.items():
         assert contact.reached.final.poses[part] == pytest.approx(T, abs=1e-3), f"{part}: more than it drifts in a hand"
 
@@ -224,11 +224,11 @@ def test_sleep_ends_with_the_replay():
 
 def test_contact_is_refused_for_the_ideal_gripper():
     with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
-        TrialSettings("stick_in_tower", grasp="weld", fidelity="contact")
+        TrialConfig("stick_in_tower", grasp="weld", fidelity="near-contact")
 
 
 def test_a_stick_that_rocked_for_ever_comes_to_rest():
-    spec = TrialSettings("stick_in_tower", 4.0, 4.0, 1.0, method="contact", seed=1)
+    spec = TrialConfig("stick_in_tower", 4.0, 4.0, 1.0, method="contact", seed=1)
     assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
 
 

@@ -28,7 +28,7 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     track = FilmTrack()
     hands = FilmTrack()
     plan = Plan(assembly, layout.start, layout.goals)
-    assert replay(plan, scene, track.hooks, fidelity="contact").outcome.code == "ok"
+    assert replay(plan, scene, track.hooks, fidelity="near-contact").outcome.code == "ok"
     assert track.plan is plan
     order = list(dict.fromkeys((m.doing.operation, m.doing.macro) for m in track.moments if m.doing.operation == 1))
     assert order == [(1, stage) for stage in ("pick", "lift", "carry", "move-to-contact", "release", "depart")]

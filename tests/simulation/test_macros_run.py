@@ -41,7 +41,7 @@ def done(
     layout = draw_layout(scenario, np.random.default_rng(1), scene.clearance_mm)
     goals = layout.goals @ pose.at(1e-3 * np.array(off_mm))
     plan = Plan(scenario.assembly, layout.start, goals, schedule)
-    return replay_and_judge(plan, scene, layout.goals, fidelity="contact")
+    return replay_and_judge(plan, scene, layout.goals, fidelity="near-contact")
 
 
 def names(scenario: Scenario) -> list[list[str]]:

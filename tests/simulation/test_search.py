@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from apo_bench import Plan, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import Plan, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import pose
 from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves
@@ -44,8 +44,8 @@ def aside(name, mm):
     return Plan(scene(name).scenario.assembly, truth.start, goals)
 
 
-def carried_out(plan, name, searches, cache=None):
-    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", cache, searches)
+def carried_out(plan, name, spiral, cache=None):
+    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", cache, spiral)
 
 
 def driven(law, push):
@@ -60,12 +60,12 @@ def driven(law, push):
 def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
     name = "vanished_fixture"
     plan = aside("vanished_fixture", 0.6)
-    blind, felt = (carried_out(plan, name, searches) for searches in (False, True))
+    blind, felt = (carried_out(plan, name, spiral) for spiral in (False, True))
     assert not blind.verdict.success
     assert felt.verdict.success
-    assert felt.result.sim_seconds > blind.result.sim_seconds
+    assert felt.result.sim_time_s > blind.result.sim_time_s
     again = carried_out(plan, name, True)
-    assert again.result.sim_seconds == felt.result.sim_seconds
+    assert again.result.sim_time_s == felt.result.sim_time_s
     for part, T in felt.result.reached.final.poses.items():
         assert again.result.reached.final.poses[part].tobytes() == T.tobytes()
 
@@ -75,36 +75,38 @@ def test_what_is_farther_off_than_the_spiral_is_not_found():
     attempt = carried_out(plan, "stick_in_tower", True)
     assert (attempt.result.outcome.stage, attempt.result.outcome.code) == ("attach", "force_stop")
     assert not attempt.verdict.success
-    assert attempt.result.sim_seconds < carried_out(plan, "stick_in_tower", False).result.sim_seconds + 30.0
+    assert attempt.result.sim_time_s < carried_out(plan, "stick_in_tower", False).result.sim_time_s + 30.0
 
 
 def row(method, level, cache=None):
-    spec = TrialSettings("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
+    spec = TrialConfig(
+        "stick_in_tower", level, level, human_error_scale=0.0, method=method, seed=1, fidelity="near-contact"
+    )
     return run_trial(spec, scene("stick_in_tower"), simulated=shown("stick_in_tower"), cache=cache)
 
 
 def test_where_no_hole_is_missed_nothing_changes():
     plain = row("oracle", 0.0)
-    felt = row("oracle+search", 0.0)
+    felt = row("oracle+spiral", 0.0)
     assert plain.pop("method") == "oracle"
-    assert felt.pop("method") == "oracle+search"
+    assert felt.pop("method") == "oracle+spiral"
     assert json.dumps(felt) == json.dumps(plain)
 
 
 def test_shared_beginnings_change_no_byte():
     cache = ReplayCache()
-    shared = [json.dumps(row(method, 0.1, cache)) for method in ("none", "search", "none")]
-    alone = [json.dumps(row(method, 0.1)) for method in ("none", "search")]
+    shared = [json.dumps(row(method, 0.1, cache)) for method in ("uncorrected", "spiral-search", "uncorrected")]
+    alone = [json.dumps(row(method, 0.1)) for method in ("uncorrected", "spiral-search")]
     assert shared == [*alone, alone[0]]
     none, search = (json.loads(each) for each in alone)
-    assert (none["failure_code"], none["spec_hash"]) == ("force_stop", search["spec_hash"])
-    assert search["sim_seconds"] > none["sim_seconds"]
+    assert (none["failure_code"], none["config_hash"]) == ("force_stop", search["config_hash"])
+    assert search["sim_time_s"] > none["sim_time_s"]
     assert none["predicted"] == search["predicted"]
 
 
 def test_holes_are_felt_for_where_parts_are_inserted():
     plan = aside("carried_bridge", 0.0)
-    done = [move.transfer for move in moves(plan, scene("carried_bridge"), searches=True)]
+    done = [move.transfer for move in moves(plan, scene("carried_bridge"), spiral=True)]
     assert [t.front is not None for t in done] == [False, False, False, True, True]
     stick, cube = done[3:]
     assert abs(stick.front[0]) == pytest.approx(0.11, abs=1e-3), "the end of the stick, less the clearance"

@@ -109,7 +109,7 @@ def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
 def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with sleeping(scene.work, asleep):
-        robot, wrist = empty_hand(scene, "external", 0.014)
+        robot, wrist = empty_hand(scene, "wrist", 0.014)
         left = press(robot, steady(robot.T, shifted(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
         assert left is not None
         assert robot.wrist is None
@@ -122,7 +122,7 @@ def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
 
 
 def test_a_press_that_meets_nothing_says_so() -> None:
-    robot, wrist = empty_hand(scene_of(), "external", 0.05)
+    robot, wrist = empty_hand(scene_of(), "wrist", 0.05)
     end = shifted(robot.T, DOWN, 0.01)
     assert press(robot, steady(robot.T, end, 0.01), DOWN, 0.5, wrist) is None
     assert pytest.approx(end) == robot.T
@@ -180,7 +180,7 @@ def test_half_the_time_step_changes_what_is_felt_by_little() -> None:
     """In the first tenth of a second of a touch by 0.3 N and 25 mNm, then by 0.1 N; where it rests by 5 mN ahead."""
     series = []
     for step_s in (0.001, 0.0005):
-        robot, wrist = empty_hand(scene_of(step_s=step_s), "external", 0.0105)
+        robot, wrist = empty_hand(scene_of(step_s=step_s), "wrist", 0.0105)
         law = Pushing(5.0, 2.0)
         comply(robot, law, robot.T[:3, 3], wrist)
         series.append(np.array(law.felt))
@@ -215,7 +215,7 @@ class Levelling(Pushing):
 )
 def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, along: float, tilt_deg: float) -> None:
     """To within 0.01 degrees along the stick of 220 mm, behind noise of 0.1 N and 5 mNm."""
-    robot, wrist, _ = with_stick(grasp, "external", along, 0.004)
+    robot, wrist, _ = with_stick(grasp, "wrist", along, 0.004)
     at = pose.at(robot.T[:3, 3])
     robot.go(at @ pose.at((0, 0, 0), (0, tilt_deg, 0)) @ pose.inverse(at) @ robot.T, 0.1)
     pitch = [np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0]))]

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import Scene, TrialSettings
+from apo_bench import Scene, TrialConfig
 from apo_bench.assembly import Observation
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene import settling
@@ -25,7 +25,7 @@ from apo_bench.trial.stages import (
 )
 from apo_bench.trial.trial import noise_of, run_trial
 
-SETTINGS = TrialSettings("block_on_block", method="none", level_mm=0.5, level_deg=0.5, seed=1)
+SETTINGS = TrialConfig("block_on_block", method="uncorrected", noise_mm=0.5, noise_deg=0.5, seed=1)
 TICKS = 40
 """After so many looks something happens."""
 
@@ -37,7 +37,7 @@ def scene() -> Scene:
 
 @cache
 def simulated() -> SimulatedDemonstration:
-    return simulate_demonstration(scene(), SETTINGS.careless, SETTINGS.seed)
+    return simulate_demonstration(scene(), SETTINGS.human_error_scale, SETTINGS.seed)
 
 
 @pytest.fixture(autouse=True)
@@ -112,7 +112,7 @@ def test_a_demonstration_that_becomes_unstable_has_failed(
         step(hands, n)
 
     monkeypatch.setattr(Hands, "_step", disturbed)
-    demonstration = simulate_demonstration(scene(), SETTINGS.careless, SETTINGS.seed).demonstration
+    demonstration = simulate_demonstration(scene(), SETTINGS.human_error_scale, SETTINGS.seed).demonstration
     assert demonstration.code == "demonstration_failed"
     assert demonstration_failure(demonstration).sentence.endswith(": the simulation became unstable")
     assert np.isfinite(demonstration.goals).all()

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.records import WrenchNoise
+from apo_bench.records import FtNoise
 from apo_bench.simulation.robot.by_wrist import reading, wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, WristSensor
@@ -20,7 +20,7 @@ ARMS = ("six_axis", "ur5e_primitive")
 POSES = (((0.1, 0.16, 0.2), (0, 0, 0)), ((0.2, -0.1, 0.25), (20, 0, 0)), ((0.1, 0.1, 0.22), (0, -25, 40)))
 
 
-def wrist(scene: Scene, noise: WrenchNoise, seed: int = 1, **settings) -> SimpleNamespace:
+def wrist(scene: Scene, noise: FtNoise, seed: int = 1, **settings) -> SimpleNamespace:
     """A sensor whose signal is set by hand, of an arm at home."""
     data = np.zeros(scene.work.model.nsensordata)
     rng = np.random.default_rng(seed)
@@ -40,7 +40,7 @@ def of_weights(made: SimpleNamespace) -> np.ndarray:
 
 
 def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_as_stated(tower: Scene) -> None:
-    made = wrist(tower, WrenchNoise(0.1, 0.005))
+    made = wrist(tower, FtNoise(0.1, 0.005))
     felt = shown(made, 60_000)[100:]
     force, torque = made.sensor.sigma
     assert (force, torque) == pytest.approx((0.1 * 0.2241, 0.005 * 0.2241), rel=1e-3)
@@ -54,7 +54,7 @@ def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_
 
 @pytest.mark.parametrize("bandwidth_hz", [8.0, 50.0])
 def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth_hz: float) -> None:
-    made = wrist(tower, WrenchNoise(0.0, 0.0), bandwidth_hz=bandwidth_hz)
+    made = wrist(tower, FtNoise(0.0, 0.0), bandwidth_hz=bandwidth_hz)
     axis = made.sensor._sensor()[:3, 0]
     felt = []
     for k in range(round(8000 / bandwidth_hz)):
@@ -69,7 +69,7 @@ def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, ste
     """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
     felt = []
     for step in (0.001, step_s):
-        made = wrist(tower, WrenchNoise(0.1, 0.005))
+        made = wrist(tower, FtNoise(0.1, 0.005))
         per_ms = round(0.001 / step)
         before = shown(made, 20 * per_ms, step)
         made.signal[2] = 0.03 / step
@@ -82,14 +82,14 @@ def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, ste
 
 
 def test_the_same_generator_gives_the_same_bytes_and_another_one_others(tower: Scene) -> None:
-    first, again, other = (shown(wrist(tower, WrenchNoise(0.1, 0.005), seed), 50).tobytes() for seed in (1, 1, 2))
+    first, again, other = (shown(wrist(tower, FtNoise(0.1, 0.005), seed), 50).tobytes() for seed in (1, 1, 2))
     assert first == again != other
 
 
 def test_the_offset_of_a_trial_is_drawn_and_zeroing_removes_it(tower: Scene) -> None:
     offsets = []
     for seed in range(200):
-        made = wrist(tower, WrenchNoise(0.1, 0.005), seed)
+        made = wrist(tower, FtNoise(0.1, 0.005), seed)
         offsets.append(made.sensor._offset)
     assert np.std(offsets, axis=0)[:3] == pytest.approx(0.1 * OFFSETS, rel=0.15)
     weight = np.array(of_weights(made))
@@ -106,7 +106,7 @@ def test_the_offset_of_a_trial_is_drawn_and_zeroing_removes_it(tower: Scene) -> 
 
 def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_asked(tower: Scene) -> None:
     """5 N upwards at a point 50 mm in front of the sensor's origin, in x: about that point there is no torque."""
-    made = wrist(tower, WrenchNoise(0.0, 0.0))
+    made = wrist(tower, FtNoise(0.0, 0.0))
     T = made.sensor._sensor()
     point = T[:3, 3] + [0.05, 0.0, 0.0]
     force = np.array([0.0, 0.0, 5.0])
@@ -124,7 +124,7 @@ def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_
 def test_in_free_air_nothing_is_felt_at_any_pose(arm: str) -> None:
     scene = build_scene(load_scenario("stick_in_tower"), arm=arm)
     robot = Robot(scene, scene.scenario.start)
-    sensor = wrist_of(robot, "external", np.random.default_rng(3))
+    sensor = wrist_of(robot, "wrist", np.random.default_rng(3))
     robot.fingers(0.01)
     zero(robot, sensor)
     home = robot.T
@@ -161,13 +161,13 @@ def test_the_sensors_of_the_wrist_are_off_unless_they_are_asked(tower: Scene) ->
 
 def test_a_motion_is_the_same_to_the_byte_while_the_wrist_feels(tower: Scene) -> None:
     ends = []
-    for feels in (False, True):
+    for probing in (False, True):
         robot = Robot(tower, tower.scenario.start)
-        sensor = wrist_of(robot, "external", np.random.default_rng(3))
+        sensor = wrist_of(robot, "wrist", np.random.default_rng(3))
         robot.wait(0.06)
-        if feels:
+        if probing:
             robot = Robot(tower, tower.scenario.start)
-            sensor = wrist_of(robot, "external", np.random.default_rng(3))
+            sensor = wrist_of(robot, "wrist", np.random.default_rng(3))
             with reading(robot, sensor):
                 robot.go(pose.at((0.02, 0.0, -0.02)) @ robot.T, 0.3)
         else:

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench import TrialSettings, load_scenario
+from apo_bench import TrialConfig, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import fingerprint, inputs
 from apo_bench.trial.fingerprint import (
     PACKAGES_WITHOUT_TRIALS,
     code_files,
+    config_hash,
     content_hash,
     counts,
     sources,
-    spec_hash,
 )
 from apo_bench.trial.inputs import own_content
 
@@ -118,8 +118,8 @@ def test_ones_own_code_counts_where_it_makes_noise_relations_or_arms(
     one, two = (own_content("noise", f"own_noise_{k}:blur") for k in (1, 2))
     assert list(one) == ["noise own_noise_1:blur"]
     assert list(one.values()) != list(two.values())
-    assert own_content("relations", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
+    assert own_content("contact_source", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
     assert own_content("arm", "no_such_module:arm") == own_content("noise", "builtins:print") == {}
-    first = spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab")
+    first = config_hash(TrialConfig("block_on_block", noise="own_noise_1:blur"), "ab")
     monkeypatch.setattr(inputs, "_module_digest", lambda module: "other")
-    assert spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab") != first
+    assert config_hash(TrialConfig("block_on_block", noise="own_noise_1:blur"), "ab") != first

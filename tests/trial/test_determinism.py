@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import Scene, SweepSettings, TrialSettings, build_scene, load_scenario, run_sweep, run_trial
+from apo_bench import Scene, SweepConfig, TrialConfig, build_scene, load_scenario, run_sweep, run_trial
 from apo_bench.cli.app import main
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.trial.stages import simulate_demonstration
@@ -28,16 +28,16 @@ def scene() -> Scene:
 
 def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
     careful = simulate_demonstration(scene, 0.0, 4)
-    careless = simulate_demonstration(scene, 1.0, 4)
-    np.testing.assert_array_equal(careful.layout.goals, careless.layout.goals)
-    np.testing.assert_array_equal(careful.demonstration.goals[0], careless.demonstration.goals[0])
+    human_error_scale = simulate_demonstration(scene, 1.0, 4)
+    np.testing.assert_array_equal(careful.layout.goals, human_error_scale.layout.goals)
+    np.testing.assert_array_equal(careful.demonstration.goals[0], human_error_scale.demonstration.goals[0])
 
 
 def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> None:
-    spec = TrialSettings("stick_on_castles", grasp="weld", method="paper", seed=3)
+    spec = TrialConfig("stick_on_castles", grasp="weld", method="paper", seed=3)
     shown = simulate_demonstration(scene, 1.0, 3)
     first = run_trial(spec, scene, simulated=shown)
-    assert first["sim_seconds"] > 1.0
+    assert first["sim_time_s"] > 1.0
     assert run_trial(spec, scene, simulated=shown) == first
     assert run_trial(spec, build_scene(load_scenario("stick_on_castles"), grasp="weld")) == first
 
@@ -48,11 +48,11 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
 
     That 1 and 2 processes give the same, also where correctors misbehave, see `tests/benchmark/sweeps/test_local.py`.
     """
-    methods = ("none", "paper")
+    methods = ("uncorrected", "paper")
     replayed = 0.5
     grids = (
-        SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), methods, trials=4),
-        SweepSettings(("block_on_block", "stick_on_castles"), (replayed,), (1.0,), methods, trials=1, seed=21),
+        SweepConfig(("stick_on_castles",), (HOPELESS,), (1.0,), methods, trials=4),
+        SweepConfig(("block_on_block", "stick_on_castles"), (replayed,), (1.0,), methods, trials=1, seed=21),
     )
     written = {}
     for workers in (None, 3):
@@ -62,9 +62,9 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
         written[workers] = sorted((folder / "trials.jsonl").read_bytes().splitlines())
     assert len(written[None]) == 8 + 4
     assert written[None] == written[3]
-    assert sum(row["level"] == replayed and row["sim_seconds"] > 1.0 for row in rows) == 4
+    assert sum(row["noise_mm"] == replayed and row["sim_time_s"] > 1.0 for row in rows) == 4
     alone = run_trial(
-        TrialSettings("stick_on_castles", level_mm=replayed, level_deg=replayed, method="paper", seed=21),
+        TrialConfig("stick_on_castles", noise_mm=replayed, noise_deg=replayed, method="paper", seed=21),
         build_scene(load_scenario("stick_on_castles")),
     )
     assert alone in rows
@@ -74,7 +74,16 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
 def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "run"
     command = [
-        *("sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1", "--methods", "none,paper"),
+        *(
+            "sweep",
+            "stick_on_castles",
+            "--noise-level",
+            "0,1",
+            "--human-error-scale",
+            "1",
+            "--method",
+            "uncorrected,paper",
+        ),
         *("--trials", "4", "--grasp", "weld", "--workers", "2", "--out", str(out)),
     ]
     process = subprocess.Popen(

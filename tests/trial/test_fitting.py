@@ -15,7 +15,7 @@ from apo_bench import (
     Observation,
     Plan,
     Scene,
-    TrialSettings,
+    TrialConfig,
     build_scene,
     correct,
     fitting_plan,
@@ -26,7 +26,7 @@ from apo_bench.assembly import Step
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.trial.fitting import FittingPlan
@@ -44,9 +44,9 @@ def scene_named(name: str) -> Scene:
 
 
 @cache
-def seen_at(name: str, seed: int, level: float = 8.0) -> Observation:
+def seen_at(name: str, seed: int, noise_level: float = 8.0) -> Observation:
     simulated = simulate_demonstration(scene_named(name), 0.0, seed)
-    return observe_demonstration(simulated, make_noise("isotropic", Level(level, level)), seed)
+    return observe_demonstration(simulated, make_noise("isotropic", NoiseLevel(noise_level, noise_level)), seed)
 
 
 def foretold(plan: Plan, scene: Scene) -> Prediction:
@@ -143,7 +143,7 @@ def test_it_is_the_same_for_every_corrector(method: str) -> None:
     assert not foretold(found.plan, scene).fails
 
 
-@pytest.mark.parametrize("method", ["none", "oracle"])
+@pytest.mark.parametrize("method", ["uncorrected", "oracle"])
 def test_what_was_not_corrected_is_not_moved(method: str) -> None:
     seen = seen_at("carried_bridge", 96)
     scene = scene_named("carried_bridge")
@@ -151,7 +151,7 @@ def test_what_was_not_corrected_is_not_moved(method: str) -> None:
     made = apply_method(method, seen, truth, where=scene)
     assert made.plan is not None
     assert made.fitting is None
-    np.testing.assert_array_equal(made.plan.goals, seen.goals if method == "none" else truth)
+    np.testing.assert_array_equal(made.plan.goals, seen.goals if method == "uncorrected" else truth)
 
 
 def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
@@ -168,14 +168,16 @@ def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
 
 
 def test_a_trial_says_what_was_moved_and_succeeds() -> None:
-    asked = TrialSettings("carried_bridge", 8.0, 8.0, careless=0.0, method="paper", seed=96, fidelity="contact")
+    asked = TrialConfig(
+        "carried_bridge", 8.0, 8.0, human_error_scale=0.0, method="paper", seed=96, fidelity="near-contact"
+    )
     row = run_trial(asked, scene_named("carried_bridge"))
     assert row["success"]
-    assert row["predicted"] is not None
-    assert not row["predicted"]["fails"]
-    assert row["free_moved"]
-    assert {moved["operation"] for moved in row["free_moved"]} <= {1, 2, 3, 4, 5}
+    assert row["failure_prediction"] is not None
+    assert not row["failure_prediction"]["fails"]
+    assert row["fit_adjustments"]
+    assert {moved["operation"] for moved in row["fit_adjustments"]} <= {1, 2, 3, 4, 5}
     assert row["gap_after_mm"] is not None
     assert row["gap_after_mm"] < 1e-6
-    untouched = run_trial(replace(asked, method="none"), scene_named("carried_bridge"))
-    assert untouched["free_moved"] is None
+    untouched = run_trial(replace(asked, method="uncorrected"), scene_named("carried_bridge"))
+    assert untouched["fit_adjustments"] is None

@@ -14,7 +14,7 @@ from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, 
 from tests import scenes
 
 
-def as_seen(scene: scenes.Scene) -> Observation:
+def is_uncorrected(scene: scenes.Scene) -> Observation:
     n = len(scene.goals)
     return Observation(
         scene.assembly, scene.start, scene.goals, np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)), np.ones(n, bool)
@@ -22,7 +22,7 @@ def as_seen(scene: scenes.Scene) -> Observation:
 
 
 def space_of(scene: scenes.Scene) -> FreeSpace:
-    found = free_space(as_seen(scene), scene.goals)
+    found = free_space(is_uncorrected(scene), scene.goals)
     assert found is not None
     return found
 
@@ -77,7 +77,7 @@ def test_contacts_that_are_open_may_stay_open() -> None:
     scene = scenes.stick_in_tower()
     goals = scene.goals.copy()
     goals[2] = goals[2] @ scenes.mm(0, 1, 0)
-    space = free_space(as_seen(scene), goals)
+    space = free_space(is_uncorrected(scene), goals)
     assert space is not None
     assert len(space) > len(space_of(scene))
     before = equations(scene.assembly, scene.start, goals).gaps(goals)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench import InputError, SweepSettings, run_sweep
+from apo_bench import InputError, SweepConfig, run_sweep
 from apo_bench.io import named_files
 from apo_bench.resources import folder
 from apo_bench.trial.inputs import module_files
@@ -43,7 +43,7 @@ def add_and_note(spec, body, picture):
     add_picture(spec, body, picture)
 
 part_file.add_picture = add_and_note
-from apo_bench import TrialSettings
+from apo_bench import TrialConfig
 from apo_bench.trial import inputs
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.stages import scene_of
@@ -64,7 +64,7 @@ sys.addaudithook(note)
 os.chdir(home)
 sys.path.insert(0, str(home))
 given = json.loads(sys.argv[3])
-settings = TrialSettings(str(home / "scenario.toml"), **given)
+settings = TrialConfig(str(home / "scenario.toml"), **given)
 content = "not read before the trial"
 scene = scene_of(settings)
 row = run_trial(settings, scene, content=content)
@@ -131,7 +131,7 @@ def shifted(goals, rng):
     moved[:, :3, 3] += rng.normal(0.0, 1e-3, (len(goals), 3))
     return moved
 """
-RELATIONS = "def given(assembly, start, truth, rng): return assembly\n"
+CONTACT_SOURCE = "def given(assembly, start, truth, rng): return assembly\n"
 
 
 def write_home(home: Path) -> None:
@@ -162,7 +162,7 @@ def write_home(home: Path) -> None:
     hat = '<geom name="hat" type="mesh" mesh="hat" material="skin" mass="0" contype="0" conaffinity="0"/>'
     (home / "arm.xml").write_text(arm.replace('<body name="base">', f'<body name="base">{hat}'))
     (home / "own").mkdir()
-    for name, source in (("arms", ARM), ("noise", NOISE), ("shifts", SHIFTS), ("relations", RELATIONS)):
+    for name, source in (("arms", ARM), ("noise", NOISE), ("shifts", SHIFTS), ("contact_source", CONTACT_SOURCE)):
         (home / "own" / f"{name}.py").write_text(source)
     (home / "own" / "__init__.py").write_text("")
     shutil.copy(home / "assets" / "noise" / "megapose-tless.toml", home / "camera.toml")
@@ -174,7 +174,7 @@ OWN = {
 }
 SHIPPED = {"scenario.toml", "assets/room.xml", "assets/parts/bored_plate.toml"}
 GIVEN = (
-    ({"arm": "own.arms:arm", "noise": "own.noise:blurred", "relations": "own.relations:given"}, OWN | SHIPPED),
+    ({"arm": "own.arms:arm", "noise": "own.noise:blurred", "contact_source": "own.relations:given"}, OWN | SHIPPED),
     ({"noise": "camera.toml"}, {"camera.toml", "assets/arms/six_axis.xml", "assets/arms/six_axis.toml"} | SHIPPED),
 )
 
@@ -185,7 +185,7 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
 ) -> None:
     home = tmp_path.resolve()
     write_home(home)
-    settings = json.dumps({"seed": 5, "method": "contact-robust", "abstain": 1.0, **given})
+    settings = json.dumps({"seed": 5, "method": "contact-robust", "min_predicted_success": 1.0, **given})
     command = [sys.executable, "-c", AUDITED, str(home), str(PACKAGE), settings]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -196,8 +196,12 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
 
 def test_a_sweep_is_not_continued_with_a_part_of_another_density(tmp_path: Path) -> None:
     write_home(tmp_path)
-    grid = SweepSettings(
-        (str(tmp_path / "scenario.toml"),), trials=1, levels=(5.0,), careless=(0.0,), methods=("none",)
+    grid = SweepConfig(
+        (str(tmp_path / "scenario.toml"),),
+        trials=1,
+        noise_level=(5.0,),
+        human_error_scale=(0.0,),
+        method=("uncorrected",),
     )
     assert len(run_sweep(grid, tmp_path / "out")) == 1
     beside = tmp_path / "own_peg.toml"

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
-from apo_bench.records import Row, look_up
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
+from apo_bench.records import TrialRecord, look_up
 from apo_bench.trial.stages import draw_robot_error
 
 SEED = 3
@@ -19,9 +19,15 @@ def scene() -> Scene:
     return build_scene(load_scenario("block_on_block"))
 
 
-def row(scene: Scene, robot_error: str, **more: Any) -> Row:
-    asked = {"method": "none", "level_mm": 0.5, "level_deg": 0.5, "careless": 0.0, "fidelity": "contact"} | more
-    return run_trial(TrialSettings("block_on_block", seed=SEED, robot_error=robot_error, **asked), scene)
+def row(scene: Scene, robot_error: str, **more: Any) -> TrialRecord:
+    asked = {
+        "method": "uncorrected",
+        "noise_mm": 0.5,
+        "noise_deg": 0.5,
+        "human_error_scale": 0.0,
+        "fidelity": "near-contact",
+    } | more
+    return run_trial(TrialConfig("block_on_block", seed=SEED, robot_error=robot_error, **asked), scene)
 
 
 def test_errors_are_in_proportion_and_each_has_its_own_chance(scene: Scene) -> None:
@@ -43,7 +49,7 @@ def test_a_plan_is_the_same_whatever_is_wrong_with_the_robot_and_ends_elsewhere(
     right = row(scene, "none")
     for wrong in ("hand_eye:1/0.2", "tool:1", "joints:0.1", "in_hand:0.5/1"):
         found = row(scene, wrong)
-        for column in ("predicted", "gap_before_mm", "gap_after_mm", "chi_square", "freed"):
+        for column in ("failure_prediction", "gap_before_mm", "gap_after_mm", "chi_square", "corrected_operations"):
             assert look_up(found, column) == look_up(right, column)
         assert found["reached"] != right["reached"]
         assert found["robot_error"] == wrong
@@ -63,7 +69,7 @@ def test_a_wrong_base_moves_a_held_part_as_much(scene: Scene) -> None:
 
 def test_a_part_slips_by_what_was_drawn(scene: Scene) -> None:
     error = draw_robot_error("in_hand:0.5", scene, SEED)
-    moved = row(scene, "in_hand:0.5", method="oracle")["moved_in_hand"]
+    moved = row(scene, "in_hand:0.5", method="oracle")["grasp_slip"]
     assert error is not None
     assert moved
     for each in moved:

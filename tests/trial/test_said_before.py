@@ -7,24 +7,30 @@ from typing import Any
 
 import pytest
 
-from apo_bench import TrialSettings
+from apo_bench import TrialConfig
 from apo_bench.assembly import Observation
 from apo_bench.geometry import Array
-from apo_bench.records import UNCORRECTED
+from apo_bench.records import WITHOUT_CORRECTOR
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial import trial
 from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
 
-MISSED = TrialSettings(
-    "peg_in_hole", method="contact-robust", relations="missed", level_mm=1.0, level_deg=1.0, seed=839900, abstain=1.0
+MISSED = TrialConfig(
+    "peg_in_hole",
+    method="contact-robust",
+    contact_source="false-negative",
+    noise_mm=1.0,
+    noise_deg=1.0,
+    seed=839900,
+    min_predicted_success=1.0,
 )
 SAID = (
-    "predicted",
-    "promised",
+    "failure_prediction",
+    "predicted_success",
     "gap_before_mm",
     "gap_after_mm",
-    "free_moved",
-    "freed",
+    "fit_adjustments",
+    "corrected_operations",
     "tried",
     "chi_square",
     "sentence",
@@ -34,7 +40,7 @@ SAID = (
 @pytest.fixture(scope="module")
 def given() -> tuple[Scene, Observation, Array]:
     scene = scene_of(MISSED)
-    simulated = simulate_demonstration(scene, MISSED.careless, MISSED.seed)
+    simulated = simulate_demonstration(scene, MISSED.human_error_scale, MISSED.seed)
     seen = observe_demonstration(simulated, trial.noise_of(MISSED, scene, simulated), MISSED.seed)
     return scene, seen, simulated.layout.goals
 
@@ -49,18 +55,18 @@ def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation
         row: Any = trial._row(MISSED, scene, right, told, truth, truth, None, None, None, None)
         said.append({name: row[name] for name in SAID})
     assert said[0] == said[1]
-    assert (said[0]["predicted"]["fails"], said[0]["predicted"]["code"]) == (False, "ok")
+    assert (said[0]["failure_prediction"]["fails"], said[0]["failure_prediction"]["code"]) == (False, "ok")
 
 
 def test_a_contact_that_was_missed_is_not_foreseen_to_fail(given: tuple[Scene, Observation, Array]) -> None:
     scene, *_ = given
     row: Any = trial.run_trial(MISSED, scene)
-    assert row["promised"] > 0.9
-    assert not row["predicted"]["fails"]
-    assert row["contacts_missed"] == 1
+    assert row["predicted_success"] > 0.9
+    assert not row["failure_prediction"]["fails"]
+    assert row["contacts_false_negative"] == 1
 
 
-@pytest.mark.parametrize("method", UNCORRECTED)
+@pytest.mark.parametrize("method", WITHOUT_CORRECTOR)
 def test_what_is_not_corrected_keeps_the_right_contacts(method: str, given: tuple[Scene, Observation, Array]) -> None:
     _, seen, truth = given
     assert trial._corrector_input(replace(MISSED, method=method), seen, truth) is seen

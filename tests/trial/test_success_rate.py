@@ -19,8 +19,8 @@ from typing import NamedTuple
 import pytest
 from scipy.stats import binom
 
-from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
-from apo_bench.records import ROW, Row
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
+from apo_bench.records import RECORD_SCHEMA, TrialRecord
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from tests.benchmarks.test_headline import fidelity, kept_rows, key
@@ -28,7 +28,7 @@ from tests.benchmarks.test_headline import fidelity, kept_rows, key
 RECORD = Path(__file__).with_name("success_rate.json")
 SEEDS = range(10)
 """Those of the record."""
-ASKED = {"none": range(5), "paper": range(5), "paper-track": range(4), "oracle": range(3)}
+ASKED = {"uncorrected": range(5), "paper": range(5), "paper-track": range(4), "oracle": range(3)}
 """Those that are run here; three verdicts of one method that differ are then a regression, two of `oracle`."""
 WHOLE = range(1)
 """At these seeds every motion is simulated; at the others where things may touch, which gives the same verdicts."""
@@ -37,43 +37,43 @@ LONGEST = "paper-track"
 EXAMPLES = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 """Those that the paper's robot takes apart and builds again."""
 OTHERS = ("stick_on_castles", "block_on_block", "bridge_cycle", "fixture_alignment")
-RATES = {"oracle": (0.99, 1.0), "paper": (0.97, 1.0), "paper-track": (0.95, 1.0), "none": (0.0, 0.05)}
+RATES = {"oracle": (0.99, 1.0), "paper": (0.97, 1.0), "paper-track": (0.95, 1.0), "uncorrected": (0.0, 0.05)}
 """The rates that the README claims, at least and at most; `none` only where a fit makes it fail."""
 FITS = (*EXAMPLES, "stick_on_castles")
 SURPRISE = 2.5e-3
 """A count less likely than this under the claimed rate is a regression."""
-METHODS = dict.fromkeys(EXAMPLES, ("oracle", "none", "paper", "paper-track"))
-METHODS |= dict.fromkeys(OTHERS, ("oracle", "none", "paper"))
-HEADLINE_METHODS = ("none", "paper", "contact")
+METHODS = dict.fromkeys(EXAMPLES, ("oracle", "uncorrected", "paper", "paper-track"))
+METHODS |= dict.fromkeys(OTHERS, ("oracle", "uncorrected", "paper"))
+HEADLINE_METHODS = ("uncorrected", "paper", "contact")
 HEADLINE_SEEDS = range(1, 5)
 """Four of those that are simulated where things may touch, as the headline is."""
-LEVEL = 1.0
+NOISE_LEVEL = 1.0
 CARELESS = 1.0
-NOT_COMPARED = ("spec_hash", "reached", "thresholds", "schema", "chi_square", "p_value")
+NOT_COMPARED = ("config_hash", "reached", "thresholds", "schema", "chi_square", "p_value")
 """The headline is older than the test of `contact` that adds play up along what is carried."""
 OTHERWISE = (
     *("success", "loose_success", "as_demonstrated_code", "failure_stage", "failure_code", "failure_operation"),
-    *("sentence", "conditions", "worst_gap_mm", "worst_angle_deg", "least_overlap", "penetration_mm", "pushed_mm"),
+    *("sentence", "conditions", "worst_gap_mm", "worst_angle_deg", "least_overlap", "penetration_mm", "displaced_mm"),
 )
 """What older rows say of the verdict that is now called `as_demonstrated`."""
-PHYSICS = ("peak_force_n", "pushed_mm", "pose_error_fixed_mm", "pose_error_free_mm")
+PHYSICS = ("peak_force_n", "displaced_mm", "pose_error_fixed_mm", "pose_error_free_mm")
 """Two rows in which one of these differs were rounded differently on the way, and everything else may differ too."""
-NEW = ("seen_again", "left_out", "free_moved", "moved_in_hand", "robot_error", "joint_control")
+NEW = ("reobservations", "inferred_operations", "fit_adjustments", "grasp_slip", "robot_error", "joint_control")
 """What rows of before do not say."""
 CASES = [(name, method) for name, methods in METHODS.items() for method in methods]
 
 
-def spec(scenario: str, method: str, seed: int) -> TrialSettings:
-    level, careless = (0.0, 0.0) if method == "oracle" else (LEVEL, CARELESS)
+def spec(scenario: str, method: str, seed: int) -> TrialConfig:
+    noise_level, human_error_scale = (0.0, 0.0) if method == "oracle" else (NOISE_LEVEL, CARELESS)
     whole = seed in WHOLE and (method != LONGEST or scenario == EXAMPLES[0])
     fidelity = "full" if whole else "contact"
-    return TrialSettings(
+    return TrialConfig(
         scenario=scenario,
         method=method,
         seed=seed,
-        level_mm=level,
-        level_deg=level,
-        careless=careless,
+        noise_mm=noise_level,
+        noise_deg=noise_level,
+        human_error_scale=human_error_scale,
         fidelity=fidelity,
     )
 
@@ -84,21 +84,21 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> SimulatedDemonstration:
+def shown(name: str, human_error_scale: float, seed: int) -> SimulatedDemonstration:
     """The demonstration that methods share, as in a sweep."""
-    return simulate_demonstration(scene(name), careless, seed)
+    return simulate_demonstration(scene(name), human_error_scale, seed)
 
 
-def trial(name: str, method: str, seed: int, cache: ReplayCache | None = None) -> Row:
+def trial(name: str, method: str, seed: int, cache: ReplayCache | None = None) -> TrialRecord:
     asked = spec(name, method, seed)
-    return run_trial(asked, scene(name), simulated=shown(name, asked.careless, seed), cache=cache)
+    return run_trial(asked, scene(name), simulated=shown(name, asked.human_error_scale, seed), cache=cache)
 
 
 class Ended(NamedTuple):
     """All trials of a scenario."""
 
     name: str
-    rows: dict[tuple[str, int], Row]
+    rows: dict[tuple[str, int], TrialRecord]
     """By method and seed."""
 
     @property
@@ -143,7 +143,7 @@ def test_success_rates_are_what_they_were(all_ended: Ended) -> None:
     if bits(all_ended.name) == recorded["bits"]:
         assert verdict == {method: recorded["verdicts"][method][: len(found)] for method, found in verdict.items()}
     for method, found in verdict.items():
-        if method != "none" or all_ended.name in FITS:
+        if method != "uncorrected" or all_ended.name in FITS:
             least, most = RATES[method]
             won = found.count("1")
             assert binom.cdf(won, len(found), least) > SURPRISE, f"{method} succeeded only {won} times"
@@ -162,7 +162,7 @@ def test_a_part_of_the_headline_runs_again_to_the_same_rows(all_ended: Ended) ->
         theirs = [kept[key(row)] for row in mine]
         for ours, recorded in zip(mine, theirs, strict=True):
             if ours["peak_force_n"] is not None and all(ours[name] == recorded[name] for name in PHYSICS):
-                left_out = NOT_COMPARED if recorded["schema"] == ROW else (*NOT_COMPARED, *OTHERWISE)
+                left_out = NOT_COMPARED if recorded["schema"] == RECORD_SCHEMA else (*NOT_COMPARED, *OTHERWISE)
                 left_out = (*left_out, *(name for name in NEW if recorded.get(name) is None))
                 same = {name: value for name, value in ours.items() if name not in left_out}
                 assert same == {name: value for name, value in recorded.items() if name not in left_out}
@@ -175,7 +175,7 @@ def test_a_part_of_the_headline_runs_again_to_the_same_rows(all_ended: Ended) ->
 def rate_of(name: str, method: str) -> float:
     """What the table says, drawn towards a half by two trials, since a rate of 100 % forbids nothing but itself."""
     mine = [spec(name, method, seed) for seed in HEADLINE_SEEDS]
-    where = (name, method, LEVEL, CARELESS, mine[0].noise, mine[0].robot_error)
+    where = (name, method, NOISE_LEVEL, CARELESS, mine[0].noise, mine[0].robot_error)
     cell = [row for row in kept_rows() if (row["scenario"], row["method"], *key(row)[3:]) == where]
     counted = [row["as_demonstrated"] for row in cell]
     return (sum(counted) + 1) / (len(counted) + 2)

@@ -15,7 +15,7 @@ from apo_bench import (
     InputError,
     Observation,
     Scene,
-    TrialSettings,
+    TrialConfig,
     build_scene,
     correct,
     load_scenario,
@@ -24,17 +24,17 @@ from apo_bench import (
 from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
 from apo_bench.cli.trial_text import print_row
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.noise import Level, make_noise
-from apo_bench.records import ENV_ID, ROW, ROW_FIELDS, level_pair, outcomes
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, noise_pair, outcomes
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.trial import stages
-from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import nominal_where_seen, run_measured
 
-SPEC = TrialSettings("stick_in_tower", grasp="weld", method="none", seed=5)
+SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def shown(scene: Scene) -> SimulatedDemonstration:
 
 @pytest.fixture(scope="module")
 def rows(scene: Scene, shown: SimulatedDemonstration) -> dict[str, dict[str, Any]]:
-    return {m: run_trial(replace(SPEC, method=m), scene, simulated=shown) for m in ("oracle", "none", "paper")}
+    return {m: run_trial(replace(SPEC, method=m), scene, simulated=shown) for m in ("oracle", "uncorrected", "paper")}
 
 
 def refuses(seen: Observation) -> Correction:
@@ -70,19 +70,23 @@ def rebuilds(seen: Observation) -> Correction:
 
 def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) -> None:
     keys = list(rows["oracle"])
-    assert set(keys) == set(ROW_FIELDS)
+    assert set(keys) == set(RECORD_FIELDS)
     for row in rows.values():
         assert list(row) == keys
         assert json.loads(json.dumps(row, allow_nan=False)) == row
-        assert (row["schema"], row["env_id"]) == (ROW, ENV_ID)
-        assert row["thresholds"]["pushed_mm"] == 1.0
+        assert (row["schema"], row["env_id"]) == (RECORD_SCHEMA, ENV_ID)
+        assert row["thresholds"]["displaced_mm"] == 1.0
         assert row["demonstration"] == "ok"
 
 
 def test_correction_makes_the_difference(rows: dict[str, dict[str, Any]]) -> None:
-    assert {method: row["success"] for method, row in rows.items()} == {"oracle": True, "none": False, "paper": True}
-    assert rows["none"]["failure_stage"] in outcomes.STAGES
-    assert rows["none"]["failure_code"] in outcomes.CODES
+    assert {method: row["success"] for method, row in rows.items()} == {
+        "oracle": True,
+        "uncorrected": False,
+        "paper": True,
+    }
+    assert rows["uncorrected"]["failure_stage"] in outcomes.STAGES
+    assert rows["uncorrected"]["failure_code"] in outcomes.CODES
     for method in ("oracle", "paper"):
         row = rows[method]
         assert (row["failure_stage"], row["failure_code"], row["failure_operation"]) == (None, None, None)
@@ -92,22 +96,22 @@ def test_correction_makes_the_difference(rows: dict[str, dict[str, Any]]) -> Non
 
 
 def test_the_row_says_what_the_corrector_did(rows: dict[str, dict[str, Any]]) -> None:
-    assert rows["paper"]["freed"] == [3, 2, 1]
-    assert rows["none"]["freed"] == []
-    assert rows["paper"]["gap_before_mm"] == rows["none"]["gap_before_mm"] == rows["none"]["gap_after_mm"]
+    assert rows["paper"]["corrected_operations"] == [3, 2, 1]
+    assert rows["uncorrected"]["corrected_operations"] == []
+    assert rows["paper"]["gap_before_mm"] == rows["uncorrected"]["gap_before_mm"] == rows["uncorrected"]["gap_after_mm"]
     assert rows["oracle"]["gap_before_mm"] < 1e-9
 
 
 def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None:
     """A careless human put castle 2 aside by 1.5 mm and more: the stick will not go in."""
-    said = rows["none"]["predicted"]
+    said = rows["uncorrected"]["failure_prediction"]
     assert (said["fails"], said["operation"], said["code"]) == (True, 3, "residual")
     assert said["size_mm"] > 1.0
     for method in ("oracle", "paper"):
-        fits = rows[method]["predicted"]
+        fits = rows[method]["failure_prediction"]
         assert (fits["fails"], fits["operation"], fits["code"]) == (False, None, "ok")
         assert fits["size_mm"] < 0.1
-    assert [rows[method]["tried"] for method in rows] == [[], [], []]
+    assert [rows[method]["tried_corrections"] for method in rows] == [[], [], []]
     assert [rows[method]["extra_operations"] for method in rows] == [0, 0, 0]
 
 
@@ -122,13 +126,17 @@ def test_a_schedule_is_carried_out_and_counted(
     np.testing.assert_array_equal(planned.targets, made.targets)
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: made)
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
-    assert row["tried"] == [
+    assert row["tried_corrections"] == [
         {"step": 3, "free": [3], "gap_mm": pytest.approx(1.5)},
         {"step": 3, "free": [3, 2], "gap_mm": pytest.approx(0.01)},
     ]
-    assert (row["freed"], row["extra_operations"], row["predicted"]["fails"]) == ([3, 2], 2, False)
+    assert (row["corrected_operations"], row["extra_operations"], row["failure_prediction"]["fails"]) == (
+        [3, 2],
+        2,
+        False,
+    )
     assert row["success"] is True
-    assert row["pushed_mm"] < 1.0
+    assert row["displaced_mm"] < 1.0
     assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
@@ -136,7 +144,7 @@ def test_a_person_reads_what_was_tried_and_foretold(
     rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     tried = [{"step": 3, "free": [3], "gap_mm": 1.528}, {"step": 3, "free": [3, 2], "gap_mm": None}]
-    print_row(rows["none"] | {"tried": tried, "freed": [3, 2], "extra_operations": 2})
+    print_row(rows["uncorrected"] | {"tried_corrections": tried, "corrected_operations": [3, 2], "extra_operations": 2})
     said = " ".join(capsys.readouterr().out.split())
     assert "after step 3 {3} leaves 1.528 mm after step 3 {3,2} did not come to rest freed {3,2}" in said
     assert "schedule 2 operations beyond doing each once predicted operation 3 fails: residual, " in said
@@ -157,17 +165,17 @@ def test_the_row_says_what_the_correction_says_of_itself(
 ) -> None:
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: doubts(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
-    assert (row["chi_square"], row["chi_square_freedom"], row["p_value"]) == (30.0, 5, 1e-5)
+    assert (row["chi_square"], row["chi_square_dof"], row["p_value"]) == (30.0, 5, 1e-5)
     assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
-    for method in ("oracle", "none", "paper"):
+    for method in ("oracle", "uncorrected", "paper"):
         assert (rows[method]["test_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (None, None, None)
-    assert [rows[method]["dropped"] for method in ("oracle", "none", "paper")] == [None, None, []]
+    assert [rows[method]["dropped"] for method in ("oracle", "uncorrected", "paper")] == [None, None, []]
 
 
 def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[str, Any]]) -> None:
     """That of `oracle` is rounding: up to 4e-14 mm was found."""
     assert max(rows["oracle"]["planned_error_fixed_mm"], rows["oracle"]["planned_error_free_mm"]) < 1e-12
-    assert rows["none"]["planned_error_fixed_mm"] > 1.0
+    assert rows["uncorrected"]["planned_error_fixed_mm"] > 1.0
     assert rows["paper"]["planned_error_fixed_mm"] < 0.1
     assert rows["paper"]["planned_error_free_mm"] > 0.5
 
@@ -176,15 +184,15 @@ def test_wrong_relations_are_told_and_noted(
     scene: Scene, shown: SimulatedDemonstration, rows: dict[str, dict[str, Any]]
 ) -> None:
     """Correctors meet them, nothing else does; robot and judge keep the right ones."""
-    kinds = ("missed", "false", "shifted:3")
-    told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, simulated=shown) for k in kinds}
-    assert [told[k]["relations"] for k in kinds] == list(kinds)
-    assert [told[k]["wrong_relation"] is None for k in kinds] == [True, False, False]
-    assert rows["paper"]["wrong_relation"] is None
+    kinds = ("false-negative", "false-positive", "shifted:3")
+    told = {k: run_trial(replace(SPEC, method="paper", contact_source=k), scene, simulated=shown) for k in kinds}
+    assert [told[k]["contact_source"] for k in kinds] == list(kinds)
+    assert [told[k]["wrong_contact"] is None for k in kinds] == [True, False, False]
+    assert rows["paper"]["wrong_contact"] is None
     assert told["shifted:3"]["success"] is False
-    raw = [rows["none"], run_trial(replace(SPEC, relations="shifted:3"), scene, simulated=shown)]
+    raw = [rows["uncorrected"], run_trial(replace(SPEC, contact_source="shifted:3"), scene, simulated=shown)]
     apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
-    assert apart == {"relations", "spec_hash"}
+    assert apart == {"contact_source", "config_hash"}
 
 
 def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> None:
@@ -200,13 +208,13 @@ def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> No
 
 def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
     content = content_hash(scene.scenario, "stick_in_tower", scene.arm.files)
-    same = {spec_hash(replace(SPEC, method=m, seed=k), content) for m in ("none", "paper") for k in (0, 9)}
+    same = {config_hash(replace(SPEC, method=m, seed=k), content) for m in ("uncorrected", "paper") for k in (0, 9)}
     assert len(same) == 1
-    others = {"level_mm": 2.0, "level_deg": 2.0, "careless": 0.0, "clearance_mm": 0.5, "noise": "a:b"}
+    others = {"noise_mm": 2.0, "noise_deg": 2.0, "human_error_scale": 0.0, "clearance_mm": 0.5, "noise": "a:b"}
     others |= {"grasp": "friction", "arm": "a:b", "timestep_s": 0.0005}
-    changed = {spec_hash(replace(SPEC, **{key: value}), content) for key, value in others.items()}
+    changed = {config_hash(replace(SPEC, **{key: value}), content) for key, value in others.items()}
     assert len(changed | same) == len(others) + 1
-    assert spec_hash(SPEC, content, "measured") not in same
+    assert config_hash(SPEC, content, "measured") not in same
     assert all(len(h) == 16 and int(h, 16) >= 0 for h in same)
 
 
@@ -221,7 +229,7 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     arm.write_text("<mujoco/>")
     part = tmp_path / "castle.xml"
     part.write_bytes(scenario.part_files["castle1"].read_bytes() + b"\n")
-    stricter = replace(scenario, thresholds=replace(scenario.thresholds, pushed_mm=0.5))
+    stricter = replace(scenario, thresholds=replace(scenario.thresholds, displaced_mm=0.5))
     wider = replace(scenario, clearance_mm=0.5)
     hashes = {
         first,
@@ -246,7 +254,7 @@ def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown
 
 def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: SimulatedDemonstration) -> None:
     seen = replace(observed(scene, shown), seen=np.array([True, False, True]))
-    raw = apply_method("none", seen, shown.layout.goals)
+    raw = apply_method("uncorrected", seen, shown.layout.goals)
     assert raw.plan is None
     assert raw.failure is not None
     assert (raw.failure.stage, raw.failure.code, raw.failure.operation) == ("observe", "not_seen", 1)
@@ -262,15 +270,15 @@ def test_a_row_without_replay_is_a_failure_with_null_physics(
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: refuses(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
-    assert (row["freed"], row["gap_after_mm"]) == ([3, 2], None)
-    assert row["tried"] == [{"step": 3, "free": [3], "gap_mm": None}]
-    assert row["predicted"] is row["extra_operations"] is None
-    assert row["reached"] is row["sim_seconds"] is row["conditions"] is None
+    assert (row["corrected_operations"], row["gap_after_mm"]) == ([3, 2], None)
+    assert row["tried_corrections"] == [{"step": 3, "free": [3], "gap_mm": None}]
+    assert row["failure_prediction"] is row["extra_operations"] is None
+    assert row["reached"] is row["sim_time_s"] is row["conditions"] is None
 
 
 def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedDemonstration) -> None:
     failed = SimulatedDemonstration(shown.layout, replace(shown.demonstration, code="demonstration_failed"))
-    rows = [run_trial(replace(SPEC, method=m), scene, simulated=failed) for m in ("oracle", "none", "paper")]
+    rows = [run_trial(replace(SPEC, method=m), scene, simulated=failed) for m in ("oracle", "uncorrected", "paper")]
     for row in rows:
         assert row["demonstration"] == "demonstration_failed"
         assert row["success"] is row["loose_success"] is None
@@ -288,8 +296,13 @@ def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: 
 
 def test_a_measured_observation_has_no_truth(scene: Scene, shown: SimulatedDemonstration) -> None:
     seen = observed(scene, shown, 40.0)
-    row = run_measured(replace(SPEC, method="none"), scene, seen, "text of the file")
-    assert (row["level"], row["careless"], row["noise"], row["demonstration"]) == (None, None, "measured", "ok")
+    row = run_measured(replace(SPEC, method="uncorrected"), scene, seen, "text of the file")
+    assert (row["noise_mm"], row["human_error_scale"], row["noise"], row["demonstration"]) == (
+        None,
+        None,
+        "measured",
+        "ok",
+    )
     assert row["success"] is False
     assert row["pose_error_fixed_mm"] is row["pose_error_free_mm"] is None
     with pytest.raises(InputError, match=r"oracle.*truth is not known"):
@@ -309,43 +322,46 @@ def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"level_deg": float("nan")}, "level in degrees of nan"),
+        ({"noise_deg": float("nan")}, "level in degrees of nan"),
         ({"seed": LARGEST_SEED + 1}, "whole numbers from 0"),
         ({"method": "papr"}, "did you mean 'paper'"),
-        ({"relations": "recognized"}, "unknown kind of relations"),
+        ({"contact_source": "recognized"}, "unknown kind of relations"),
     ],
 )
 def test_a_specification_is_checked_at_the_door(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        TrialSettings(**(asdict(SPEC) | changes))
+        TrialConfig(**(asdict(SPEC) | changes))
 
 
 def test_a_level_is_one_number_or_two() -> None:
-    assert level_pair(2) == (2.0, 2.0)
-    assert level_pair([1.0, 0.5]) == (1.0, 0.5)
+    assert noise_pair(2) == (2.0, 2.0)
+    assert noise_pair([1.0, 0.5]) == (1.0, 0.5)
     with pytest.raises(InputError, match="a pair of mm and degrees"):
-        level_pair([1.0, 2.0, 3.0])
+        noise_pair([1.0, 2.0, 3.0])
     for wrong in (None, "far", ["far", 1.0], []):
         with pytest.raises(InputError, match="one number is allowed"):
-            level_pair(wrong)  # type: ignore[arg-type]
+            noise_pair(wrong)  # type: ignore[arg-type]
 
 
 def test_a_level_of_a_ray_is_one_number() -> None:
-    assert level_pair(2, "range") == (2.0, 0.0)
+    assert noise_pair(2, "range") == (2.0, 0.0)
     with pytest.raises(InputError, match="one number is allowed, mm per ray"):
-        level_pair((1.0, 2.0), "range")
-    for make in (lambda: level_pair(51, "range"), lambda: TrialSettings("stick_in_tower", level_mm=51, eye="range")):
+        noise_pair((1.0, 2.0), "range")
+    for make in (
+        lambda: noise_pair(51, "depth-camera"),
+        lambda: TrialConfig("stick_in_tower", noise_mm=51, pose_source="depth-camera"),
+    ):
         with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm per ray"):
             make()
     with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm and 1 degree"):
-        TrialSettings("stick_in_tower", level_mm=51)
+        TrialConfig("stick_in_tower", noise_mm=51)
 
 
-@pytest.mark.parametrize("relations", ["recognised-jointly:3", "false:"])
-def test_only_shifted_relations_have_a_size(relations: str) -> None:
+@pytest.mark.parametrize("contact_source", ["recognised-jointly:3", "false:"])
+def test_only_shifted_relations_have_a_size(contact_source: str) -> None:
     with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
-        TrialSettings("stick_in_tower", relations=relations)
+        TrialConfig("stick_in_tower", contact_source=contact_source)
 
 
-def observed(scene: Scene, shown: SimulatedDemonstration, level: float = 1.0) -> Observation:
-    return observe_demonstration(shown, make_noise("isotropic", Level(level, level)), SPEC.seed)
+def observed(scene: Scene, shown: SimulatedDemonstration, noise_level: float = 1.0) -> Observation:
+    return observe_demonstration(shown, make_noise("isotropic", NoiseLevel(noise_level, noise_level)), SPEC.seed)

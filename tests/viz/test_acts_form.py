@@ -40,7 +40,7 @@ def plan(name: str) -> Plan:
 
 
 @cache
-def form(name: str, frames: str = "tip", sensor: str = "external") -> dict[str, Any]:
+def form(name: str, frames: str = "tip", sensor: str = "wrist") -> dict[str, Any]:
     return json.loads(json.dumps(acts_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
 
 
@@ -113,15 +113,15 @@ def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor
         flat = [move.transfer.flush for move in moves(plan(name), scene(name), True, ACTS)]
         return [each and each["averaged_over_s"] for each, f in zip(laid, flat, strict=True) if f is not None]
 
-    for sensor, felt in (("external", 0.1), ("cobot", 3.5)):
+    for sensor, felt in (("wrist", 0.1), ("joint-torque", 3.5)):
         sigma = wrist_of(
             Robot(scene("stick_in_tower"), plan("stick_in_tower").start), sensor, np.random.default_rng(0)
         ).sigma
         flush = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ACTS)[-1].transfer.flush
         assert sigma[0] < felt
         assert averaged("stick_in_tower", sensor) == [pytest.approx(averaged_s(flush, sigma), abs=1e-6)]
-    assert averaged("peg_in_hole", "cobot") == [None]
-    assert averaged("peg_in_hole", "external") != [None]
+    assert averaged("peg_in_hole", "joint-torque") == [None]
+    assert averaged("peg_in_hole", "wrist") != [None]
 
 
 def test_an_unknown_sensor_is_refused() -> None:

@@ -42,7 +42,7 @@ def test_who_follows_a_careless_human() -> None:
 
 def test_numbers_are_those_of_the_scenario() -> None:
     scenario = load_scenario("stick_in_tower")
-    text = scenario_card(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, pushed_mm=7.0)))
+    text = scenario_card(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, displaced_mm=7.0)))
     assert "within 0.5 mm (at 0.4 mm clearance per side)" in text
     assert "more than 7 mm from where it was put" in text
     assert "x 120 ± 40 mm, y 0 ± 60 mm, turned by -28 to 28 degrees" in text

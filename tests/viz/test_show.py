@@ -66,8 +66,8 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     [
         (("--step", "4"), "step 4 was given; the scenario has operations 1 to 3"),
         (
-            ("--level", "1", "--observation", "docs/seen.csv"),
-            "--level, which draws a trial, was given together with",
+            ("--noise-level", "1", "--observation", "docs/seen.csv"),
+            "--noise-level, which draws a trial, was given together with",
         ),
         (("--out", "seen.jpg"), "ends in .png"),
     ],

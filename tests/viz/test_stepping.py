@@ -13,25 +13,25 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import Scene, SweepSettings, run_sweep
+from apo_bench import Scene, SweepConfig, run_sweep
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.shapes import shapes_of, surface
 from apo_bench.simulation.film.track import part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import initial_state
-from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story, scenario_story
+from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
 from apo_bench.viz.finished_trial import trial_again
 from apo_bench.viz.stepping import FACES, Cursor
 
 
-def with_goals(scene: Scene) -> Story:
+def with_goals(scene: Scene) -> Rollout:
     """What the tower asks for, as if it had been seen 1 cm aside."""
-    story = scenario_story(scene)
+    rollout = scenario_story(scene)
     true = scene.scenario.goals
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
-    return Story(scene, story.chapters, story.assembled, {AS_SEEN: aside, AS_TRUE: true})
+    return Rollout(scene, rollout.chapters, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
 
 
 def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> None:
@@ -47,7 +47,7 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
     assert set(last.faces) == {of for contact in assembly.operations[2].contacts for of in contact}
     assert last.words[0].endswith("operation 3 of 3, stick: in place")
     poses = part_poses(last.chapter, last.moment)
-    for part, T in cursor.story.assembled.items():
+    for part, T in cursor.rollout.assembled.items():
         np.testing.assert_allclose(poses[part], T, atol=1e-9)
     cursor.press("previous operation")
     assert cursor.moment.doing.operation == 1
@@ -61,7 +61,7 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
 
 def test_chapters_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None:
     one = scenario_story(tower)
-    cursor = Cursor(Story(tower, (one.chapters[0], replace(one.chapters[0], title="again")), one.assembled))
+    cursor = Cursor(Rollout(tower, (one.chapters[0], replace(one.chapters[0], title="again")), one.assembled))
     cursor.press("next chapter")
     assert (cursor.place, cursor.chapter.title) == (4, "again")
     cursor.press("previous")
@@ -155,7 +155,7 @@ def test_keys_of_the_window_move_what_is_shown(tower: Scene, monkeypatch: pytest
     monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=launch))
     monkeypatch.setattr(mujoco, "viewer", SimpleNamespace(launch_passive=launch), raising=False)
     cursor = Cursor(with_goals(tower))
-    step_in_window(tower, cursor.story.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
+    step_in_window(tower, cursor.rollout.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
     (window,) = windows
     assert ["at the start" in window.texts[0], "operation 1 of 3" in window.texts[1]] == [True, True]
     assert window.drawn[0] == 0 < window.drawn[1] < window.drawn[2]
@@ -163,16 +163,21 @@ def test_keys_of_the_window_move_what_is_shown(tower: Scene, monkeypatch: pytest
 
 
 def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
-    asked = SweepSettings(
-        ("block_on_block",), levels=(3.0,), careless=(0.0,), methods=("contact",), trials=1, fidelity="contact"
+    asked = SweepConfig(
+        ("block_on_block",),
+        noise_level=(3.0,),
+        human_error_scale=(0.0,),
+        method=("contact",),
+        trials=1,
+        fidelity="near-contact",
     )
     (row,) = run_sweep(asked, tmp_path / "run")
-    again, story = trial_again(tmp_path / "run", None)
+    again, rollout = trial_again(tmp_path / "run", None)
     assert {name: again[name] for name in ("success", "worst_gap_mm")} == {
         name: row[name] for name in ("success", "worst_gap_mm")
     }
-    assert set(story.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
-    reached = part_poses(story.chapters[1], story.chapters[1].moments[-1])
+    assert set(rollout.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
+    reached = part_poses(rollout.chapters[1], rollout.chapters[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():
         np.testing.assert_allclose(1e3 * reached[part][:3, 3], packed[:3], atol=0.01)

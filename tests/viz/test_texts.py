@@ -59,7 +59,7 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     observation = tower()
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
     recognised = Recognised(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
-    form = recognition_form("tower", "recognised", observation, recognised, False)
+    form = recognition_form("tower", "detected", observation, recognised, False)
     _, right, wrong = table_lines(evidence_table(form))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
     assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
@@ -79,7 +79,7 @@ def test_a_set_of_contacts_that_is_not_likely_is_called_not_certain() -> None:
     recognised = Recognised(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
 
     def said(recognised: Recognised) -> list[str]:
-        return confidence_lines(recognition_form("tower", "recognised", observation, recognised, False))
+        return confidence_lines(recognition_form("tower", "detected", observation, recognised, False))
 
     (line,) = said(recognised)
     assert line.startswith("not certain: this set of contacts is right with probability 0.75")
@@ -93,7 +93,7 @@ def test_contacts_that_were_missed_are_named() -> None:
     every = tuple(evidence_of(r.contact, r.made) for r in observation.assembly.relations())
     fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
     forms = [
-        recognition_form("tower", "recognised", observation, recognised, False)
+        recognition_form("tower", "detected", observation, recognised, False)
         for recognised in (Recognised(observation.assembly, every), Recognised(fewer.assembly, every[:1]))
     ]
     assert difference_lines(forms[0]) == [f"all {len(every)} contacts of the scenario were recognised, and no other"]

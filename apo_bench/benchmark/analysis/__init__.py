@@ -15,12 +15,12 @@ from apo_bench.benchmark.analysis.over_seeds import (
     threshold,
 )
 from apo_bench.benchmark.analysis.paired import Paired, tango
-from apo_bench.benchmark.analysis.place import PLACE_FIELDS, Place, by_place, level_label, order, place_of, rank
+from apo_bench.benchmark.analysis.place import PLACE_FIELDS, Place, by_place, noise_label, order, place_of, rank
 from apo_bench.benchmark.analysis.prediction import confusions
 from apo_bench.benchmark.analysis.probing import felt
 from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, Cell, Interval, Rate, Records, tally, wilson
 from apo_bench.benchmark.analysis.recognition import recognitions
-from apo_bench.benchmark.analysis.settings import level_of, level_unit, level_words, levels_of, members, settings
+from apo_bench.benchmark.analysis.settings import level_of, level_unit, levels_of, members, noise_words, settings
 from apo_bench.benchmark.analysis.summary import Summary, summary
 from apo_bench.benchmark.analysis.timing import read_timing, trial_times, work
 from apo_bench.benchmark.analysis.words import percent, percents, points, signed
@@ -48,13 +48,13 @@ __all__ = (
     "efforts",
     "felt",
     "gaps",
-    "level_label",
     "level_of",
     "level_unit",
-    "level_words",
     "levels_of",
     "mean_surprise",
     "members",
+    "noise_label",
+    "noise_words",
     "order",
     "percent",
     "percents",

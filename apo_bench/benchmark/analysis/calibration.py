@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import rank, rank_relations
+from apo_bench.benchmark.analysis.place import rank, rank_contact_source
 from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
 from apo_bench.records import knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
 
-_AXES = ("scenario", "noise", "relations", "method")
+_AXES = ("scenario", "noise", "contact_source", "method")
 
 
 def calibrations(records: Records) -> list[Line]:
@@ -20,14 +20,14 @@ def calibrations(records: Records) -> list[Line]:
     poses along directions that contacts fix and leave free, and how often the test fails and names the culprit.
     """
     trials = trials_of(records)
-    counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("level"))
+    counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
     groups = trials.where(counted & ~trials.holds("method", knows_truth)).parts(_AXES)
     return [_line(dict(zip(_AXES, key, strict=True)), groups[key]) for key in sorted(groups, key=_order)]
 
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
-    scenario, noise, relations, method = key
-    return scenario, noise, rank_relations(relations), rank(method), method
+    scenario, noise, contact_source, method = key
+    return scenario, noise, rank_contact_source(contact_source), rank(method), method
 
 
 def _line(axes: Line, trials: Trials) -> Line:
@@ -37,9 +37,9 @@ def _line(axes: Line, trials: Trials) -> Line:
     loose = clearance > 0
     inside = trials.number("inside_95")
     passes = trials.number("test_passes")
-    known = trials.where((passes == 0) & ~trials.holds("wrong_relation", (None,).__contains__))
+    known = trials.where((passes == 0) & ~trials.holds("wrong_contact", (None,).__contains__))
     named = [
-        one in (all_ or ()) for one, all_ in zip(known.values("wrong_relation"), known.values("suspects"), strict=True)
+        one in (all_ or ()) for one, all_ in zip(known.values("wrong_contact"), known.values("suspects"), strict=True)
     ]
     return axes | {
         "planned": len(planned),

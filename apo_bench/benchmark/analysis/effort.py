@@ -18,8 +18,8 @@ def efforts(records: Records) -> list[Line]:
             "method": method,
             "trials": len(own),
             "extra_operations": float(own.number("extra_operations").mean()),
-            "sim_seconds": float(np.median(own.number("sim_seconds"))),
-            "pushed_mm": float(np.nan_to_num(own.number("pushed_mm")).max()),
+            "sim_time_s": float(np.median(own.number("sim_time_s"))),
+            "displaced_mm": float(np.nan_to_num(own.number("displaced_mm")).max()),
         }
         for (scenario, method), own in by_method(right).items()
     ]

@@ -18,7 +18,7 @@ from apo_bench.benchmark.analysis.place import Place
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, Cell
 from apo_bench.geometry import Array
 from apo_bench.io import grouped
-from apo_bench.records import RANGE, knows_truth
+from apo_bench.records import DEPTH_CAMERA, knows_truth
 
 
 @final
@@ -33,7 +33,7 @@ class HalfLevel:
     largest: float
     trials: int
     """Results over all levels."""
-    level: float | None
+    noise_level: float | None
     """The estimate; None where it lies outside the levels tried."""
     beyond: str | None
     """On which side of them it lies, `below` or `above`."""
@@ -45,8 +45,8 @@ class HalfLevel:
     @property
     def text(self) -> str:
         """`1.31`, `> 4`, `< 0.1`."""
-        if self.level is not None:
-            return f"{self.level:.3g}"
+        if self.noise_level is not None:
+            return f"{self.noise_level:.3g}"
         return f"> {self.largest:g}" if self.beyond == "above" else f"< {self.smallest:g}"
 
     @property
@@ -71,7 +71,7 @@ def half_level(place: Place, cells: Sequence[Cell]) -> HalfLevel:
     """Where the rates of cells at rising levels cross one half."""
     from scipy.optimize import isotonic_regression
 
-    levels = np.array([c.level for c in cells])
+    levels = np.array([c.noise_mm for c in cells])
     right = np.array([c.successes for c in cells])
     trials = np.array([c.trials for c in cells])
     over, under = map(int, sure(right, trials))
@@ -84,7 +84,7 @@ def half_level(place: Place, cells: Sequence[Cell]) -> HalfLevel:
         smallest=float(levels[met][0]),
         largest=float(levels[-1]),
         trials=int(trials.sum()),
-        level=None if beyond else float(np.exp(np.interp(0.5, falling[::-1], x[::-1]))),
+        noise_level=None if beyond else float(np.exp(np.interp(0.5, falling[::-1], x[::-1]))),
         beyond=beyond,
         surely_over=float(levels[over - 1]) if over else None,
         surely_under=float(levels[-under]) if under else None,
@@ -109,4 +109,4 @@ def sure(right: Array, trials: Array) -> tuple[Array, Array]:
 
 
 def _is_usual(cell: Cell) -> bool:
-    return cell.level_deg == (0.0 if cell.noise == RANGE else cell.level)
+    return cell.noise_deg == (0.0 if cell.noise == DEPTH_CAMERA else cell.noise_mm)

@@ -10,11 +10,11 @@ import numpy as np
 from apo_bench.benchmark.analysis.place import Place, by_place
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, mean
 from apo_bench.geometry import Array
-from apo_bench.records import TrialSettings, feels, knows_relations, knows_truth, may_look
+from apo_bench.records import TrialConfig, knows_truth, may_reobserve, probes, uses_contacts
 from apo_bench.records.run.trials import Trials, trials_of
 
 K = TypeVar("K", bound=Hashable)
-REFERENCES = ("paper", "none")
+REFERENCES = ("paper", "uncorrected")
 _EDGE = 1e-9
 """Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
 
@@ -109,10 +109,12 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
 
 def place_of_reference(place: Place, reference: str) -> Place:
     """What a cell, or a curve, is compared with: `none` asks for no relations, few for looks, few robots feel."""
-    other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
-    if not feels(reference):
-        other = other._replace(wrench=TrialSettings.wrench, stated_error=TrialSettings.stated_error)
-    return other if knows_relations(reference) else other._replace(relations="given")
+    other = place._replace(
+        method=reference, max_reobservations=place.max_reobservations if may_reobserve(reference) else 0
+    )
+    if not probes(reference):
+        other = other._replace(ft_sensor=TrialConfig.ft_sensor, assumed_robot_error=TrialConfig.assumed_robot_error)
+    return other if uses_contacts(reference) else other._replace(contact_source="given")
 
 
 def _comparison(pair: Paired) -> frozenset[Place]:

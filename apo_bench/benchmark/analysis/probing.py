@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.place import Place, by_place
 from apo_bench.benchmark.analysis.rates import Records, root_mean_square
-from apo_bench.records import robot_sigmas, told_error
+from apo_bench.records import assumed_error, robot_sigmas
 from apo_bench.records.run.trials import Trials, trials_of
 
 
@@ -18,27 +18,27 @@ def felt(records: Records) -> list[Line]:
     robot was told of it (None if nothing), as it felt it in the end, and how far that may be wrong by its own account.
     """
     trials = trials_of(records)
-    own = trials.where(~np.isnan(trials.number("touches")))
+    own = trials.where(~np.isnan(trials.number("probe_contacts")))
     return [_line(place, felt_there) for place, felt_there in by_place(own).items()]
 
 
 def _line(place: Place, trials: Trials) -> Line:
-    told = told_error(place.stated_error, place.robot_error)
+    told = assumed_error(place.assumed_robot_error, place.robot_error)
     drawn_mm, drawn_deg = _as_vector(place.robot_error)
     stated_mm, stated_deg = (None, None) if told is None else _as_vector(told)
     return {
         "place": place,
         "trials": len(trials),
-        "touches": float(trials.number("touches").mean()),
-        "refused": int(trials.number("touches_refused").sum()),
+        "probe_contacts": float(trials.number("probe_contacts").mean()),
+        "refused": int(trials.number("probe_contacts_rejected").sum()),
         "drawn_mm": drawn_mm,
         "stated_mm": stated_mm,
-        "felt_mm": root_mean_square(trials.number("felt_mm")),
-        "sure_mm": root_mean_square(trials.number("felt_sure_mm")),
+        "base_error_estimate_mm": root_mean_square(trials.number("base_error_estimate_mm")),
+        "sure_mm": root_mean_square(trials.number("base_error_std_mm")),
         "drawn_deg": drawn_deg,
         "stated_deg": stated_deg,
-        "felt_deg": root_mean_square(trials.number("felt_deg")),
-        "sure_deg": root_mean_square(trials.number("felt_sure_deg")),
+        "base_error_estimate_deg": root_mean_square(trials.number("base_error_estimate_deg")),
+        "sure_deg": root_mean_square(trials.number("base_error_std_deg")),
     }
 
 

@@ -63,7 +63,7 @@ class Cell(Place):
     before anything moved, or the worker died. They count as failures."""
     abstained: int
     """Those of them whose plan promised too little."""
-    promised: float | None
+    predicted_success: float | None
     """Mean of what plans promised; None where no plan did."""
     brier: float | None
     """Mean squared difference of promise and success over the trials whose plan promised anything and was executed."""
@@ -89,7 +89,7 @@ class Cell(Place):
     @property
     def tightness(self) -> float | None:
         """Clearance per side over level, mm per mm: small is tight; None where poses are seen exactly."""
-        return self.clearance_mm / self.level if self.level > 0 else None
+        return self.clearance_mm / self.noise_mm if self.noise_mm > 0 else None
 
     @property
     def demonstrated_rate(self) -> float | None:
@@ -151,7 +151,7 @@ def _cell(place: Place, trials: Trials) -> Cell:
     counted = trials.where(~np.isnan(trials.number("success")))
     success = counted.number("success")
     executed = was_executed(counted)
-    promised = counted.number("promised")
+    predicted_success = counted.number("predicted_success")
     failed = counted.where(success == 0)
     why = Counter(map("{}: {}".format, failed.values("failure_stage"), failed.values("failure_code")))
     return Cell(
@@ -162,8 +162,8 @@ def _cell(place: Place, trials: Trials) -> Cell:
         loose_successes=int(np.nansum(counted.number("loose_success"))),
         not_executed=int((~executed).sum()),
         abstained=int(failed.holds("failure_code", ("abstained",).__contains__).sum()),
-        promised=mean(promised),
-        brier=mean((promised - success)[executed] ** 2),
+        predicted_success=mean(predicted_success),
+        brier=mean((predicted_success - success)[executed] ** 2),
         excluded=len(trials) - len(counted),
         failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
     )

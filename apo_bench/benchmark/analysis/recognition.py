@@ -6,10 +6,10 @@ import numpy as np
 
 from apo_bench.benchmark.analysis.line import ALL, Line
 from apo_bench.benchmark.analysis.rates import Rate, Records
-from apo_bench.records import RECOGNISED
+from apo_bench.records import DETECTED
 from apo_bench.records.run.trials import Trials, trials_of
 
-_AXES = ("scenario", "noise", "eye", "relations", "careless", "level", "level_deg")
+_AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_level", "noise_deg")
 
 
 def recognitions(records: Records) -> list[Line]:
@@ -19,8 +19,8 @@ def recognitions(records: Records) -> list[Line]:
     contact was recognised, and no other.
     """
     trials = trials_of(records)
-    known = ~np.isnan(trials.number("contacts_right")) & ~np.isnan(trials.number("level"))
-    told = trials.where(known & trials.holds("relations", RECOGNISED.__contains__))
+    known = ~np.isnan(trials.number("contacts_true_positive")) & ~np.isnan(trials.number("noise_mm"))
+    told = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
     observations = told.groups((*_AXES, "seed", "clearance_mm")).of
     once = told.where(np.unique(observations, return_index=True)[1])
     parts = once.parts(_AXES)
@@ -48,5 +48,5 @@ def _line(axes: Line, trials: Trials) -> Line:
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
     """All scenarios last; the ways of recognising in their own order."""
-    scenario, noise, eye, relations, *rest = key
-    return (scenario == ALL, scenario, noise, eye, RECOGNISED.index(relations), *rest)
+    scenario, noise, pose_source, contact_source, *rest = key
+    return (scenario == ALL, scenario, noise, pose_source, DETECTED.index(contact_source), *rest)

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
-from apo_bench.benchmark.analysis.place import Place, level_label, rank_relations
+from apo_bench.benchmark.analysis.place import Place, noise_label, rank_contact_source
 from apo_bench.io import grouped
-from apo_bench.records import RANGE, USUAL, feels, knows_relations, knows_truth, may_look
+from apo_bench.records import DEPTH_CAMERA, USUAL, knows_truth, may_reobserve, probes, uses_contacts
 
 _Item = TypeVar("_Item", bound=Any)
 """Whatever has a place."""
@@ -36,10 +36,15 @@ def holds(setting: Place, place: Place) -> bool:
     method = place.method
     return (
         _site(place) == _site(setting)
-        and (knows_truth(method) or (place.noise, place.careless) == (setting.noise, setting.careless))
-        and (not knows_relations(method) or place.relations == setting.relations)
-        and (not may_look(method) or place.looks == setting.looks)
-        and (not feels(method) or (place.wrench, place.stated_error) == (setting.wrench, setting.stated_error))
+        and (
+            knows_truth(method) or (place.noise, place.human_error_scale) == (setting.noise, setting.human_error_scale)
+        )
+        and (not uses_contacts(method) or place.contact_source == setting.contact_source)
+        and (not may_reobserve(method) or place.max_reobservations == setting.max_reobservations)
+        and (
+            not probes(method)
+            or (place.ft_sensor, place.assumed_robot_error) == (setting.ft_sensor, setting.assumed_robot_error)
+        )
     )
 
 
@@ -50,31 +55,40 @@ def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:
 
 def level_of(item: Any) -> tuple[float, float]:
     """In mm and degrees."""
-    return item.place.level, item.place.level_deg
+    return item.place.noise_mm, item.place.noise_deg
 
 
-def level_words(level: tuple[float, float], noise: str) -> str:
+def noise_words(level: tuple[float, float], noise: str) -> str:
     """`0.5`, or `0.5 mm, 1 deg` where they differ."""
-    return f"{level[0]:g}" if noise == RANGE else level_label(*level, noise)
+    return f"{level[0]:g}" if noise == DEPTH_CAMERA else noise_label(*level, noise)
 
 
 def level_unit(noise: str) -> str:
     """What a level is, as an axis says it."""
-    return "level: mm per ray" if noise == RANGE else "level: mm and degrees per axis"
+    return "level: mm per ray" if noise == DEPTH_CAMERA else "level: mm and degrees per axis"
 
 
 def _meets(method: str) -> tuple[bool, ...]:
     """What of a setting a method meets: noise, relations, what a robot that feels is given, looks."""
-    return not knows_truth(method), knows_relations(method), feels(method), may_look(method)
+    return not knows_truth(method), uses_contacts(method), probes(method), may_reobserve(method)
 
 
 def _site(x: Place) -> tuple[Any, ...]:
-    return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error, x.abstain
+    return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error, x.min_predicted_success
 
 
 def _order(s: Place) -> tuple[Any, ...]:
-    conditions = (s.careless, s.grasp, s.fidelity, s.looks, s.robot_error, s.wrench, s.stated_error, s.abstain)
-    return (s.scenario, s.clearance_mm, s.noise != USUAL, s.noise, rank_relations(s.relations), *conditions)
+    conditions = (
+        s.human_error_scale,
+        s.grasp,
+        s.fidelity,
+        s.max_reobservations,
+        s.robot_error,
+        s.ft_sensor,
+        s.assumed_robot_error,
+        s.min_predicted_success,
+    )
+    return (s.scenario, s.clearance_mm, s.noise != USUAL, s.noise, rank_contact_source(s.contact_source), *conditions)
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:

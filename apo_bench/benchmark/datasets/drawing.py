@@ -32,10 +32,10 @@ from apo_bench.perception.observation.models import (
     Sighted,
     Symmetric,
 )
-from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.records import USUAL, TrialSettings, check, level_pair
-from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error
+from apo_bench.records import USUAL, TrialConfig, check, noise_pair
+from apo_bench.scenario import Scenario, human_error_covariance, load_scenario, spread_error
 from apo_bench.scenario.layouts import Layouts, draw_layouts
 
 _BY_PART = frozenset(
@@ -66,7 +66,9 @@ def by_part(noise: Noise) -> bool:
     return fails_by_part or (type(noise) in _BY_PART and not shares_view)
 
 
-def observe_many(assembly: Assembly, shown: Layouts, careless: Array, noise: Noise, rng: np.random.Generator) -> Seen:
+def observe_many(
+    assembly: Assembly, shown: Layouts, human_error_scale: Array, noise: Noise, rng: np.random.Generator
+) -> Seen:
     """What a noise model makes of many demonstrations of one assembly.
 
     Args:
@@ -77,12 +79,14 @@ def observe_many(assembly: Assembly, shown: Layouts, careless: Array, noise: Noi
     if by_part(noise):
         start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
         long = Demonstration(
-            _repeated(assembly, n), start, shown.goals.reshape(-1, 4, 4), {}, np.tile(careless, (n, 1, 1))
+            _repeated(assembly, n), start, shown.goals.reshape(-1, 4, 4), {}, np.tile(human_error_scale, (n, 1, 1))
         )
         return _stacked([noise(long.assembly, long, rng)], n, k)
     each = []
     for i, goals in enumerate(shown.goals):
-        one = Demonstration(assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, careless)
+        one = Demonstration(
+            assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, human_error_scale
+        )
         each.append(observe(one, noise, rng))
     return _stacked(each, n, k)
 
@@ -165,8 +169,8 @@ def pairs(
     n: int = 1000,
     seed: int = 0,
     *,
-    level: float | Sequence[float] = 1.0,
-    careless: float = TrialSettings.careless,
+    noise_level: float | Sequence[float] = 1.0,
+    human_error_scale: float = TrialConfig.human_error_scale,
 ) -> Pairs:
     """Pairs of observation and truth; of several scenarios in turn.
 
@@ -186,7 +190,7 @@ def pairs(
     """
     require(1 <= n <= _MOST, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
     blocks = list[Pairs]()
-    for block in endless_pairs(scenarios, noise, seed, level=level, careless=careless):
+    for block in endless_pairs(scenarios, noise, seed, noise_level=noise_level, human_error_scale=human_error_scale):
         blocks.append(block)
         if sum(map(len, blocks)) >= n:
             break
@@ -200,21 +204,21 @@ def endless_pairs(
     noise: Any = USUAL,
     seed: int = 0,
     *,
-    level: float | Sequence[float] = 1.0,
-    careless: float = TrialSettings.careless,
+    noise_level: float | Sequence[float] = 1.0,
+    human_error_scale: float = TrialConfig.human_error_scale,
 ) -> Iterator[Pairs]:
     """Pairs without end, `BLOCK` of each scenario at a time, in turn; arguments are those of `pairs`."""
     several: Any = scenarios if isinstance(scenarios, Iterable) and not isinstance(scenarios, str) else [scenarios]
     given = [*several]
     require(given, "no scenario was given; give one or more.")
     check("seed", seed)
-    check("careless", careless)
-    model = make_noise(noise, Level(*level_pair(level)))
+    check("human_error_scale", human_error_scale)
+    model = make_noise(noise, NoiseLevel(*noise_pair(noise_level)))
     loaded = [load_scenario(each) for each in given]
-    return (_block(loaded, model, seed, number, careless) for number in count())
+    return (_block(loaded, model, seed, number, human_error_scale) for number in count())
 
 
-def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, careless: float) -> Pairs:
+def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, human_error_scale: float) -> Pairs:
     m = len(scenarios)
     n = m * BLOCK
     k = max(len(scenario.assembly) for scenario in scenarios)
@@ -224,8 +228,8 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     for i, scenario in enumerate(scenarios):
         rng = stream(seed, scenario.name, number)
         layouts = draw_layouts(scenario, rng, BLOCK)
-        shown = Layouts(layouts.goals @ _mistakes(scenario, careless, rng), layouts.start)
-        seen = observe_many(scenario.assembly, shown, careless_covariance(scenario, careless), noise, rng)
+        shown = Layouts(layouts.goals @ _mistakes(scenario, human_error_scale, rng), layouts.start)
+        seen = observe_many(scenario.assembly, shown, human_error_covariance(scenario, human_error_scale), noise, rng)
         rows = slice(i, None, m), slice(len(scenario.assembly))
         truth[rows] = layouts.goals
         goals[rows], covariance[rows], there[rows] = seen
@@ -240,12 +244,12 @@ def stream(seed: int, scenario: str, number: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 
 
-def _mistakes(scenario: Scenario, careless: float, rng: np.random.Generator) -> Array:
+def _mistakes(scenario: Scenario, human_error_scale: float, rng: np.random.Generator) -> Array:
     """What a careless human adds to the goals, (BLOCK, k, 4, 4): as in a demonstration, in each of the layouts."""
     twists = np.zeros((BLOCK, len(scenario.assembly), 6))
-    if (how := scenario.careless) is not None:
+    if (how := scenario.human_error) is not None:
         # how an error spreads is the same in every layout, and in proportion to it
         way = spread_error(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
-        size = careless * rng.choice([-1.0, 1.0], BLOCK) * rng.uniform(how.low_m, how.high_m, BLOCK)
+        size = human_error_scale * rng.choice([-1.0, 1.0], BLOCK) * rng.uniform(how.low_m, how.high_m, BLOCK)
         twists[..., :3] = size[:, None, None] * way
     return pose.exp(twists)

@@ -11,7 +11,7 @@ from apo_bench.assembly import Plan
 from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
-from apo_bench.records import Row, TrialSettings
+from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.simulation.hooks import Doing, Hooks
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_felt
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
@@ -23,17 +23,17 @@ _OF_ROW = MappingProxyType(
         "seed": "number of the trial",
         "method": "what made the plan",
         "noise": "model of the camera",
-        "level": "of the noise, mm",
-        "level_deg": "of the noise, degrees",
-        "careless": "0 for a careful human, 1 for the scenario's",
+        "noise_level": "of the noise, mm",
+        "noise_deg": "of the noise, degrees",
+        "human_error_scale": "0 for a careful human, 1 for the scenario's",
         "success": "whether the assembly is right at the end; the judge's word",
         "as_demonstrated": "whether each contact was also made when and where it was shown",
         "failure_stage": "where it failed; null if it did not",
         "failure_code": "how it failed",
         "failure_operation": "which operation failed, from 1",
         "sentence": "the same in words",
-        "sim_seconds": "simulated time of the replay, s",
-        "spec_hash": "of everything that this trial depends on",
+        "sim_time_s": "simulated time of the replay, s",
+        "config_hash": "of everything that this trial depends on",
     }
 )
 _POSES = "(x, y, z, qw, qx, qy, qz), world frame, m"
@@ -161,7 +161,7 @@ class _Recorder:
         return frames
 
 
-def replays(trials: Iterable[TrialSettings], scenes: Mapping[str, Scene]) -> Iterator[Replay]:
+def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Iterator[Replay]:
     """Run trials, each in the scene of its scenario.
 
     Raises:
@@ -170,7 +170,9 @@ def replays(trials: Iterable[TrialSettings], scenes: Mapping[str, Scene]) -> Ite
     for settings in trials:
         scene = scenes[settings.scenario]
         recorder = _Recorder(scene)
-        simulated = simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+        simulated = simulate_demonstration(
+            scene, settings.human_error_scale, settings.seed, settings.pose_source, settings.secret_seed
+        )
         with wrist_felt(scene.work.model):
             row = run_trial(settings, scene, simulated=simulated, watch=recorder.hooks())
         yield Replay(scene, _episode(settings, scene, simulated, row, recorder), recorder.frames())
@@ -263,10 +265,10 @@ def replay_rollouts(found: Iterable[Replay], about: About, say: Callable[[str], 
 
 
 def _episode(
-    settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, row: Row, recorder: _Recorder
+    settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, row: TrialRecord, recorder: _Recorder
 ) -> dict[str, Any]:
     """What is said of one episode."""
-    seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed, settings.salt)
+    seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed, settings.secret_seed)
     plan = recorder.plan
     return {
         **{name: row.get(name) for name in _OF_ROW},

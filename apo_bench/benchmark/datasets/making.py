@@ -21,7 +21,7 @@ from apo_bench.envs.policies import POLICIES, insert_env
 from apo_bench.errors import RAISED, InputError, missing_package, require, require_known
 from apo_bench.io import has_parquet, write_file
 from apo_bench.names import resolve
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.trial.stages import scene_of
 
 _FRAME = "way in"
@@ -69,7 +69,7 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(
 
 
 def insertions(
-    trials: Sequence[TrialSettings], policy: str, command: str, say: Callable[[str], None]
+    trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
 ) -> tuple[About, Iterator[Rollout]]:
     """Have a policy insert, trial by trial, all scenarios one after the other.
 
@@ -101,7 +101,7 @@ def insertions(
     return about, _rollouts(trials, policy, act, say)
 
 
-def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Rollout]:
+def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Rollout]:
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
@@ -149,7 +149,7 @@ FORMATS = ("parquet", "lerobot", "minari")
 
 
 def make_dataset(
-    trials: Sequence[TrialSettings],
+    trials: Sequence[TrialConfig],
     out: Path,
     command: str,
     form: str = "parquet",

@@ -24,15 +24,18 @@ from apo_bench.benchmark.analysis import (
     rank,
 )
 from apo_bench.benchmark.analysis.over_seeds import PooledRate
-from apo_bench.records import CORRECTOR, knows_relations, knows_truth
+from apo_bench.records import CORRECTOR, knows_truth, uses_contacts
 from apo_bench.records.run.trials import trials_of
 
 ALIKE_WITHIN = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
-_AGAINST = ("none", "paper", "contact", CORRECTOR)
+_AGAINST = ("uncorrected", "paper", "contact", CORRECTOR)
 """The best method is compared with these; if none of them was tried, with the next best."""
 _GIVEN = "given"
-_SAME_TRIAL = (*(name for name in PLACE_FIELDS if name not in ("method", "relations", "looks")), "seed")
+_SAME_TRIAL = (
+    *(name for name in PLACE_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
+    "seed",
+)
 _Who = tuple[str, int]
 """A method, and how often it might look again."""
 
@@ -49,7 +52,11 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
         counts = ", ".join(f"{_named(who)} in 0 of {len(results[who].seed):,}" for who in (best, *others))
         return f"No method succeeds in any trial: {counts}.{told}"
     own = pooled_rate(results[best])
-    half = [h for h in half_levels if (h.place.method, h.place.looks) == best and h.place.relations in kinds]
+    half = [
+        h
+        for h in half_levels
+        if (h.place.method, h.place.max_reobservations) == best and h.place.contact_source in kinds
+    ]
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
     reached = _reach(half) if own.seeds >= FEWEST_SEEDS else ""
     sentences = (_counted(best, own), reached, *(_compared(best, who, results) for who in known), _few(own))
@@ -59,15 +66,15 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
 def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
     """Successes of each method, and what correctors were told: the right relations, or else what there is."""
     trials = trials_of(records)
-    counts = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("level"))
+    counts = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))
     counted = trials.where(counts & ~trials.holds("method", knows_truth))
-    informed = counted.holds("method", knows_relations)
-    kinds = sorted(counted.where(informed).distinct("relations")) or [_GIVEN]
+    informed = counted.holds("method", uses_contacts)
+    kinds = sorted(counted.where(informed).distinct("contact_source")) or [_GIVEN]
     kinds = [_GIVEN] if _GIVEN in kinds else kinds
     # the one trial of a method that is told nothing would count once for each kind of relations that others hear
-    here = counted.where(np.where(informed, counted.holds("relations", kinds.__contains__), len(kinds) == 1))
-    trial = here.groups((*_SAME_TRIAL, *["relations"] * (len(kinds) > 1))).of
-    methods = here.groups(("method", "looks"))
+    here = counted.where(np.where(informed, counted.holds("contact_source", kinds.__contains__), len(kinds) == 1))
+    trial = here.groups((*_SAME_TRIAL, *["contact_source"] * (len(kinds) > 1))).of
+    methods = here.groups(("method", "max_reobservations"))
     results = {}
     for k, who in enumerate(methods.keys):
         own = methods.of == k
@@ -90,8 +97,10 @@ def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
 
 def _named(who: _Who) -> str:
     """`contact`, or `contact-robust` with 2 more looks."""
-    method, looks = who
-    return f"`{method}`" + (f" with {looks} more look{'s' * (looks > 1)}" if looks else "")
+    method, max_reobservations = who
+    return f"`{method}`" + (
+        f" with {max_reobservations} more look{'s' * (max_reobservations > 1)}" if max_reobservations else ""
+    )
 
 
 def _counted(who: _Who, own: PooledRate) -> str:
@@ -113,7 +122,7 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     """Where its curve over the level falls to one half; of several settings the worst."""
     if not half:
         return ""
-    worst = min(half, key=lambda h: (h.beyond == "above", h.level or 0.0, h.largest))
+    worst = min(half, key=lambda h: (h.beyond == "above", h.noise_level or 0.0, h.largest))
     which = "each" if worst.beyond == "above" else "the worst"
     where = f"In {which} of {len(half)} settings its" if len(half) > 1 else "Its"
     if worst.beyond == "above":

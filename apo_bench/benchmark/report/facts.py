@@ -17,7 +17,7 @@ def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> d
     seeds = trials.number("seed")
     said: dict[str, Any] = {name: sorted(trials.distinct(name)) for name in shared}
     said |= {"seeds": f"{seeds.min():.0f} to {seeds.max():.0f}", "hosts": sorted(hosts)}
-    said |= {"specifications": len(trials.distinct("spec_hash")), "salt": trials.find_salt() or "none"}
+    said |= {"specifications": len(trials.distinct("config_hash")), "secret_seed": trials.find_secret_seed() or "none"}
     tables: dict[str, Any] = {"What the rows say": said, "What run.json says": {}}
     for key, value in run.items():
         if isinstance(value, dict):

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.benchmark.analysis import Records, rank
 from apo_bench.benchmark.analysis.rates import was_executed
-from apo_bench.records import Row, Salt
+from apo_bench.records import SecretSeed, TrialRecord
 from apo_bench.records.run.replay_command import DATA_PREFIXES, Files, is_own_code, left_out
 from apo_bench.records.run.trials import Mask, Trials, trials_of
 
@@ -19,7 +19,7 @@ from apo_bench.records.run.trials import Mask, Trials, trials_of
 class FailurePicture(NamedTuple):
     """Of one trial."""
 
-    row: Row
+    row: TrialRecord
     jpeg: bytes
     words: str
     """How it was made."""
@@ -35,7 +35,7 @@ class Pictures(NamedTuple):
 
     most: int = 0
     draw: Draw | None = None
-    salt: Salt | None = None
+    secret_seed: SecretSeed | None = None
     trust_code: bool = False
     """Run also trials that name code that does not come with the package."""
 
@@ -45,12 +45,12 @@ def draw_failures(trials: Trials, folder: Path, files: Files, how: Pictures) -> 
     if not how.most or how.draw is None:
         return [], []
     chosen = sample(trials, how.most, trust_code=how.trust_code)
-    pictures, missing = how.draw(chosen, folder, files, how.salt, trust_code=how.trust_code)
+    pictures, missing = how.draw(chosen, folder, files, how.secret_seed, trust_code=how.trust_code)
     without = "" if how.trust_code else left_out(trials.where(_names_code(trials)).rows())
     return pictures, [*missing, *([without] if without else [])]
 
 
-def sample(records: Records, most: int, *, trust_code: bool = False) -> list[Row]:
+def sample(records: Records, most: int, *, trust_code: bool = False) -> list[TrialRecord]:
     """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
 
     The same trials, in any order, give the same sample. Those that were not carried out have nothing to be seen.
@@ -59,12 +59,12 @@ def sample(records: Records, most: int, *, trust_code: bool = False) -> list[Row
         trust_code: Also trials that name code of somebody's own.
     """
     trials = trials_of(records)
-    failed = (trials.number("success") == 0) & (trials.number("sim_seconds") > 0) & was_executed(trials)
-    failed &= ~np.isnan(trials.number("level"))
+    failed = (trials.number("success") == 0) & (trials.number("sim_time_s") > 0) & was_executed(trials)
+    failed &= ~np.isnan(trials.number("noise_mm"))
     if not trust_code:
         failed &= ~_names_code(trials)
     ways = trials.where(failed).parts(("failure_stage", "failure_code"))
-    chosen: list[Row] = []
+    chosen: list[TrialRecord] = []
     for way in sorted(ways, key=lambda way: (-len(ways[way]), way))[:most]:
         shown = Counter(x for row in chosen for x in (row["method"], row["scenario"]))
         chosen.append(min(_first(ways[way]), key=partial(_order, shown)))
@@ -77,15 +77,22 @@ def _names_code(trials: Trials) -> Mask:
     return reduce(or_, named)
 
 
-def _first(trials: Trials) -> Sequence[Row]:
+def _first(trials: Trials) -> Sequence[TrialRecord]:
     """The trials of the first seed of each method and scenario."""
     firsts = (
         own.where(own.number("seed") == own.number("seed")[0]) for own in trials.parts(("method", "scenario")).values()
     )
-    return cast(list[Row], [row for own in firsts for row in own.rows()])
+    return cast(list[TrialRecord], [row for own in firsts for row in own.rows()])
 
 
-def _order(shown: Mapping[str, int], row: Row) -> tuple[Any, ...]:
-    where = (row["scenario"], row["clearance_mm"], row["noise"], row["relations"], row["careless"], row["level"])
+def _order(shown: Mapping[str, int], row: TrialRecord) -> tuple[Any, ...]:
+    where = (
+        row["scenario"],
+        row["clearance_mm"],
+        row["noise"],
+        row["contact_source"],
+        row["human_error_scale"],
+        row["noise_mm"],
+    )
     often = shown[row["method"]] + shown[row["scenario"]]
     return (often, row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)

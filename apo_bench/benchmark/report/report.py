@@ -37,17 +37,17 @@ from apo_bench.benchmark.report.tables.methods import (
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_folders, check_target, has_parquet, write_columns, write_file
-from apo_bench.records import check_same_salt, read_salt
+from apo_bench.records import check_same_secret_seed, read_secret_seed
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
-PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "recognised")
+PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "detected")
 """Figures that are also kept as PNG."""
-FILES = ("cells", "pairs", "half_levels", "recognised", "gaps", "confusion", "felt", "times")
+FILES = ("cells", "pairs", "half_levels", "detected", "gaps", "confusion", "felt", "times")
 """Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
-_IF_ANY = ("recognised", "felt", "times")
+_IF_ANY = ("detected", "felt", "times")
 _OURS = (*FILES, *PNG, "rows", "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of our tables and figures, without endings; `difference_to_..` is ours too."""
 PAGE = "report.html"
@@ -77,7 +77,7 @@ class Report(NamedTuple):
 def report(
     folder: str | Path,
     pictures: int = 0,
-    salt_file: str | Path | None = None,
+    secret_seed_file: str | Path | None = None,
     *,
     trust_code: bool = False,
     draw: Draw | None = None,
@@ -97,9 +97,9 @@ def report(
     folder = Path(folder)
     trials = read_trials(folder)
     require(len(trials), f"'{folder}' holds no finished trial yet; run the sweep before its report.")
-    salt = None if salt_file is None else read_salt(salt_file)
-    if salt is not None:
-        check_same_salt(f"'{folder}'", salt.hash, trials.find_salt())
+    secret_seed = None if secret_seed_file is None else read_secret_seed(secret_seed_file)
+    if secret_seed is not None:
+        check_same_secret_seed(f"'{folder}'", secret_seed.hash, trials.find_secret_seed())
     numbers = summary(trials)
     require(
         numbers.cells, f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
@@ -109,7 +109,7 @@ def report(
         check_folders(folder / name for name in (TABLES, FIGURES))
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
-        return _write(folder, trials, numbers, Pictures(pictures, draw, salt, trust_code))
+        return _write(folder, trials, numbers, Pictures(pictures, draw, secret_seed, trust_code))
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
@@ -123,14 +123,14 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
         "half_levels": half_table(numbers.half_levels),
         "gaps": gap_table(gaps(trials)),
         "confusion": confusion_table(confusions(trials)),
-        "recognised": recognition_table(recognitions(trials)),
+        "detected": recognition_table(recognitions(trials)),
         "calibration": calibration_table(calibrations(trials)),
         "felt": felt_table(felt(trials)),
         "effort": effort_table(efforts(trials)),
         "times": time_table(trial_times(timing)),
         "work": work_table(work(timing)),
     }
-    lines = (tables[name].items for name in ("gaps", "confusion", "recognised", "times"))
+    lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))
     drawn = figures(numbers.cells, numbers.pairs, settings(numbers.cells), *lines)
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}

@@ -10,16 +10,16 @@ NUMBERS: Mapping[str, str] = {
     "worst_angle_deg": "angle reached [deg]",
     "least_overlap": "least overlap",
     "penetration_mm": "penetration [mm]",
-    "pushed_mm": "pushed [mm]",
+    "displaced_mm": "pushed [mm]",
     "planned_error_fixed_mm": "planned error, fixed [mm]",
     "planned_error_free_mm": "planned error, free [mm]",
     "pose_error_fixed_mm": "reached error, fixed [mm]",
     "pose_error_free_mm": "reached error, free [mm]",
     "p_value": "p of the test",
-    "promised": "promised",
+    "predicted_success": "predicted_success",
     "extra_operations": "extra operations",
     "peak_force_n": "peak force [N]",
-    "sim_seconds": "simulated [s]",
+    "sim_time_s": "simulated [s]",
 }
 """Numbers of a trial, in the order of a page, with what they are called there."""
 

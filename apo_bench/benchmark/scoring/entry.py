@@ -55,7 +55,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Those that count."""
     executed: Count
     """Those whose plan was carried out."""
-    promised: Share | None
+    predicted_success: Share | None
     """Mean of what plans promised; None where none did."""
     brier: Share | None
     """Mean squared difference of promise and success, of plans that were carried out."""
@@ -63,7 +63,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Over the rows, in any order."""
     code: Hash
     """The same over the source files and package versions they were made with."""
-    salt: Hash | None
+    secret_seed: Hash | None
     """Hash of the secret that the trials were drawn with; None for trials that everybody can draw."""
     cells: Mapping[Text, Trials]
     """Settings of a cell -> its trials, one character each, the first seed first."""
@@ -85,7 +85,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ),
         )
         require(
-            self.brier is None or (self.promised is not None and self.executed > 0),
+            self.brier is None or (self.predicted_success is not None and self.executed > 0),
             "a Brier score is stated, and no plan that promised anything was carried out",
         )
 

@@ -172,7 +172,11 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
         (
             Column("entry", "entry", lambda pair: pair[0].name, words=True),
             Column("track", "track", lambda pair: pair[1], words=True),
-            Column("promised", "promised", lambda pair: _percent(pair[0].tracks[pair[1]].promised)),
+            Column(
+                "predicted_success",
+                "predicted_success",
+                lambda pair: _percent(pair[0].tracks[pair[1]].predicted_success),
+            ),
             Column("score", "score", lambda pair: f"{pair[0].tracks[pair[1]].score:.1f}"),
             Column("brier", "Brier score", lambda pair: f"{pair[0].tracks[pair[1]].brier:.3f}"),
         ),
@@ -235,7 +239,7 @@ def _label(name: str) -> str:
 
 
 def _is_verified(entry: Entry, salts: frozenset[str]) -> bool:
-    return all(track.salt in salts for track in entry.tracks.values())
+    return all(track.secret_seed in salts for track in entry.tracks.values())
 
 
 def _overall(entry: Entry) -> str | None:

@@ -16,7 +16,7 @@ from apo_bench.benchmark.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, En
 from apo_bench.benchmark.scoring.track import Track
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.io import brief, clean, grouped
-from apo_bench.records import SETTINGS, Row
+from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
 
 _HEX = 16
@@ -78,11 +78,11 @@ def score(
     )
 
 
-def _scored(track: Track, runs: Mapping[str, Sequence[Row]], run: Mapping[str, Any]) -> TrackScore:
+def _scored(track: Track, runs: Mapping[str, Sequence[TrialRecord]], run: Mapping[str, Any]) -> TrackScore:
     """What the rows of a track say, of all of its arms."""
     rows = [row for own in runs.values() for row in own]
     counted = [row for row in rows if row["success"] is not None]
-    promises = [(p, row) for row in counted if (p := row.get("promised")) is not None]
+    promises = [(p, row) for row in counted if (p := row.get("predicted_success")) is not None]
     carried = [row for row in counted if row["failure_stage"] not in NOT_EXECUTED]
     errors = [(p - bool(row["success"])) ** 2 for p, row in promises if row["failure_stage"] not in NOT_EXECUTED]
     cells = _cells(rows)
@@ -95,23 +95,23 @@ def _scored(track: Track, runs: Mapping[str, Sequence[Row]], run: Mapping[str, A
         high=high,
         trials=len(counted),
         executed=len(carried),
-        promised=_mean([p for p, _ in promises]),
+        predicted_success=_mean([p for p, _ in promises]),
         brier=_mean(errors),
         rows=_digest(sorted(json.dumps(row, sort_keys=True) for row in rows)),
         code=_digest([json.dumps({key: run[key] for key in ("code", "versions", "content")}, sort_keys=True)]),
-        salt=run.get("salt"),
+        secret_seed=run.get("secret_seed"),
         cells=cells,
     )
 
 
-def _cells(rows: Iterable[Row]) -> dict[str, str]:
+def _cells(rows: Iterable[TrialRecord]) -> dict[str, str]:
     """Settings of a cell -> how its trials ended, the first seed first."""
     cells = grouped((_cell(row), row) for row in rows)
     spell = partial(map, lambda row: EXCLUDED if row["success"] is None else (WRONG, RIGHT)[row["success"]])
     return {key: "".join(spell(sorted(cells[key], key=lambda row: row["seed"]))) for key in sorted(cells)}
 
 
-def _cell(row: Row) -> str:
+def _cell(row: TrialRecord) -> str:
     """What the trials of a cell have in common, but for the method."""
     place = place_of(row)
     assert place is not None  # trials of a sweep have a level

@@ -14,14 +14,14 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import SweepSettings
+from apo_bench.benchmark.sweeps.grid import SweepConfig
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.errors import require, unknown
 from apo_bench.io import read_bytes, read_toml
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.resources import folder
 
 SCHEMA = "apo-bench/track/1"
@@ -42,15 +42,14 @@ class Track:
     arms: tuple[str, ...]
     hash: str
     """16 hexadecimal digits over the bytes of the file."""
-    grids: tuple[SweepSettings, ...]
+    grids: tuple[SweepConfig, ...]
     """Their methods mean nothing."""
 
-    def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepSettings, ...]:
+    def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepConfig, ...]:
         """The trials of a method on one of the arms."""
+        own: dict[str, Any] = {"method": (method,), "arm": arm}
         return tuple(
-            replace(
-                grid, methods=(method,), arm=arm, trials=min(grid.trials, self.quick_trials) if quick else grid.trials
-            )
+            replace(grid, **own, trials=min(grid.trials, self.quick_trials) if quick else grid.trials)
             for grid in self.grids
         )
 
@@ -65,12 +64,13 @@ def seen_by(track: Track, estimator: str) -> Track:
         InputError: No such file.
     """
     content = read_bytes(estimator, "noise file (.toml)")
+    own: dict[str, Any] = {"noise": (estimator,), "pose_source": (TrialConfig.pose_source,)}
     return replace(
         track,
         name=f"{track.name}-{Path(estimator).stem}",
         overall=False,
         hash=hashlib.sha256(track.hash.encode() + content).hexdigest()[:_HEX],
-        grids=tuple(replace(grid, noises=(estimator,), eyes=(TrialSettings.eye,)) for grid in track.grids),
+        grids=tuple(replace(grid, **own) for grid in track.grids),
     )
 
 
@@ -97,7 +97,7 @@ def read_track(given: str | Path) -> Track:
     said = top.child(top.value[TABLE], TABLE).fields_of(SCHEMA, ("title",), ("overall", "quick_trials", "arms"))
     quick = said["quick_trials"].integer() if "quick_trials" in said else 1
     require(quick >= 1, f"{path}, {TABLE}, quick_trials: a whole number from 1 is needed, {quick} was given.")
-    arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialSettings.arm]
+    arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialConfig.arm]
     require(arms, f"{path}, {TABLE}, arms: at least one is needed; leave the key out for the usual one.")
     grids = read_sweep(path, besides=(TABLE,))
     require(

@@ -24,11 +24,11 @@ from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, environment
 from apo_bench.names import OwnModules, folder_of_own_modules
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.request import Request, checked_request, lost_request, run_request
 
-Emit = Callable[[Row, Timing], None]
+Emit = Callable[[TrialRecord, Timing], None]
 """Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Workers have one thread per linear algebra library: the processes already fill the cores."""
@@ -108,7 +108,7 @@ def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: 
         return []
 
 
-def run_request_alone(request: Request, limit_s: float) -> Row:
+def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
     """What `run_request` does, in a process of its own that may take so much wall time.
 
     Raises:
@@ -120,7 +120,7 @@ def run_request_alone(request: Request, limit_s: float) -> Row:
     check_limit(limit_s)
     with stoppable(), process_pool(1) as pool:
         try:
-            row: Row = pool.schedule(run_request, [request], timeout=limit_s).result()
+            row: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
             return row
         except (ProcessExpired, TimeoutError) as error:
             return lost_request(request, settings, scenario, _code_of(error))

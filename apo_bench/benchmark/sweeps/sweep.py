@@ -5,25 +5,25 @@ from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import Batch, SweepSettings, check_grids, described, load_all, units
+from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, described, load_all, units
 from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
 from apo_bench.benchmark.sweeps.progress import progress
 from apo_bench.benchmark.sweeps.stopping import stoppable
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
 from apo_bench.correction.correctors import checked_corrector
 from apo_bench.errors import require, require_known
-from apo_bench.perception.observation.noise import Level, make_noise
-from apo_bench.perception.observation.relations import make_relations
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.wrong_contacts import make_contacts
 from apo_bench.records import (
     CORRECTOR,
-    RECOGNISED,
-    UNCORRECTED,
+    DETECTED,
+    WITHOUT_CORRECTOR,
     Limits,
-    Row,
-    TrialSettings,
-    level_pair,
-    parsed,
-    salt_of_sweep,
+    TrialConfig,
+    TrialRecord,
+    noise_pair,
+    parse_method,
+    secret_seed_of_sweep,
     trial_key,
     with_simulated,
 )
@@ -32,7 +32,7 @@ from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
-from apo_bench.trial.fingerprint import code_files, content_hash, spec_hash, versions
+from apo_bench.trial.fingerprint import code_files, config_hash, content_hash, versions
 from apo_bench.trial.inputs import content_pieces, noise_content, own_content
 
 _LARGEST_WORKERS = 256
@@ -43,7 +43,7 @@ BATCH = 8
 
 @check_arguments
 def run_sweep(
-    grids: SweepSettings | Sequence[SweepSettings],
+    grids: SweepConfig | Sequence[SweepConfig],
     out: str | Path,
     *,
     workers: int | None = None,
@@ -51,8 +51,8 @@ def run_sweep(
     backend: str = "local",
     address: str | None = None,
     command: str = "",
-    salt_file: str | Path | None = None,
-) -> list[Row]:
+    secret_seed_file: str | Path | None = None,
+) -> list[TrialRecord]:
     """Run every trial of a sweep that has no row yet.
 
     The rows depend on neither the number of workers, nor where they run, nor the order in which trials end.
@@ -78,7 +78,7 @@ def run_sweep(
         RuntimeError: A trial could not be run, or a row could not be written.
         KeyboardInterrupt: After Ctrl-C or a signal; the rows of the batches that had ended are written.
     """
-    grids = (grids,) if isinstance(grids, SweepSettings) else tuple(grids)
+    grids = (grids,) if isinstance(grids, SweepConfig) else tuple(grids)
     _check_executor(workers, limit_s, backend, address)
     check_grids(grids)
     # everything that has a name is found before a folder is made or a process started
@@ -89,7 +89,7 @@ def run_sweep(
     arm = find_arm(arm_name)
     content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
     inputs = SweepInputs(content, versions())
-    salt = None if salt_file is None else salt_of_sweep(salt_file, out)
+    secret_seed = None if secret_seed_file is None else secret_seed_of_sweep(secret_seed_file, out)
     here = workers is None and backend == "local"
     run = run_record(
         described(grids, loaded),
@@ -98,14 +98,14 @@ def run_sweep(
         inputs.versions,
         {loaded[source].name: source for source in loaded if not is_named(source)},
         command,
-        salt,
+        secret_seed,
         Limits(None if here else limit_s),
     )
     with stoppable(), RunFolder(Path(out), run) as store:
-        batches = list(_left(units(grids, loaded, salt), loaded, inputs, store))
+        batches = list(_left(units(grids, loaded, secret_seed), loaded, inputs, store))
         with progress(sum(map(len, batches))) as count:
 
-            def emit(row: Row, timing: Timing) -> None:
+            def emit(row: TrialRecord, timing: Timing) -> None:
                 store.append(row, timing)
                 count()
 
@@ -120,7 +120,7 @@ def run_sweep(
                 from apo_bench.benchmark.sweeps.cluster import run_on_cluster
                 from apo_bench.benchmark.sweeps.travelling import travelling_files
 
-                names = (*_names(grids, "methods"), *_names(grids, "noises"), *_names(grids, "relations"), arm_name)
+                names = (*_names(grids, "method"), *_names(grids, "noise"), *_names(grids, "contact_source"), arm_name)
                 files = travelling_files(loaded, arm.files, names)
                 run_on_cluster(batches, inputs, workers, limit_s, emit, address, files)
         return store.rows()
@@ -130,7 +130,7 @@ def _left(
     work: Iterable[Batch], loaded: Mapping[str, Scenario], inputs: SweepInputs, store: RunFolder
 ) -> Iterator[Batch]:
     """Batches of the trials that have no row yet; the rows that there are must be what those trials would give."""
-    hashes: dict[TrialSettings, str] = {}
+    hashes: dict[TrialConfig, str] = {}
     for unit in work:
         left = []
         for trial in unit:
@@ -139,7 +139,7 @@ def _left(
             if found is None:
                 left.append(trial)
             elif cell not in hashes:
-                hashes[cell] = spec_hash(trial, inputs.content[trial.scenario])
+                hashes[cell] = config_hash(trial, inputs.content[trial.scenario])
             require(
                 found is None or found == hashes[cell],
                 f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
@@ -166,28 +166,28 @@ def _check_executor(workers: int | None, limit_s: float, backend: str, address: 
         check_ray(address)
 
 
-def _check_names(grids: Sequence[SweepSettings]) -> None:
+def _check_names(grids: Sequence[SweepConfig]) -> None:
     """Raise an `InputError` unless noise models, relations and correctors can be had here."""
     for grid in grids:
-        highest = max(max(level_pair(level)) for level in grid.levels)
-        for noise in grid.noises:
-            make_noise(noise, Level(highest, highest))
-        for relations in grid.relations:
-            if relations not in RECOGNISED:
-                make_relations(relations)
-        for method in grid.methods:
-            plan = parsed(method).plan
-            if plan not in UNCORRECTED:
-                checked_corrector(with_simulated(plan))
+        highest = max(max(noise_pair(noise_level)) for noise_level in grid.noise_level)
+        for noise in grid.noise:
+            make_noise(noise, NoiseLevel(highest, highest))
+        for contact_source in grid.contact_source:
+            if contact_source not in DETECTED:
+                make_contacts(contact_source)
+        for method in grid.method:
+            corrector = parse_method(method).corrector
+            if corrector not in WITHOUT_CORRECTOR:
+                checked_corrector(with_simulated(corrector))
 
 
-def _names(grids: Sequence[SweepSettings], axis: str) -> tuple[str, ...]:
+def _names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:
     """What all grids name on an axis, each once."""
     return tuple(dict.fromkeys(name for grid in grids for name in getattr(grid, axis)))
 
 
 def _content(
-    grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], arm_files: tuple[Path, ...]
+    grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], arm_files: tuple[Path, ...]
 ) -> dict[str, str]:
     """What the trials are made of besides the package, piece by piece, so that a change can be named."""
     pieces = {
@@ -197,8 +197,8 @@ def _content(
     }
     return {
         **pieces,
-        **noise_content(*_names(grids, "noises")),
-        **own_content("relations", *_names(grids, "relations")),
-        **own_content("method", *_names(grids, "methods")),
+        **noise_content(*_names(grids, "noise")),
+        **own_content("contact_source", *_names(grids, "contact_source")),
+        **own_content("method", *_names(grids, "method")),
         **own_content("arm", grids[0].arm),
     }

@@ -1,13 +1,13 @@
 """Sweep files: grids as TOML; every complaint names file, key and remedy.
 
-    scenarios = ["stick_in_tower", "carried_bridge"]
-    levels = [0.5, 1, 2]
-    methods = ["none", "paper", "contact"]
+    scenario = ["stick_in_tower", "carried_bridge"]
+    noise_level = [0.5, 1, 2]
+    method = ["uncorrected", "paper", "contact"]
     trials = 40
 
-    [[also]]                  # a further grid: what it does not say is as above
-    methods = ["oracle"]
-    levels = [0]
+    [[also]]                  # a further grid: keys that it does not have are as above
+    method = ["oracle"]
+    noise_level = [0]
 
 Lengths in mm, angles in degrees; paths as on the command line, from the current folder.
 """
@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepSettings
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
 from apo_bench.errors import InputError, require
 from apo_bench.io import JsonNode, read_toml
 from apo_bench.records import SETTINGS, in_python
 
-_SEVERAL = {info.axis: info for info in AXES}
-"""Keys whose values are lists."""
+_SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
+"""Keys that take one value or several."""
 _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
 SWEEP_KEYS = (*_SEVERAL, "trials", "seed")
@@ -38,13 +38,13 @@ def is_sweep_file(text: str) -> bool:
     if not text.lower().endswith(".toml"):
         return False
     keys = read_toml(text, "sweep or scenario file").value
-    return "scenarios" in keys or not {"parts", "operations"} & set(keys)
+    return "scenario" in keys or not {"parts", "operations"} & set(keys)
 
 
 @check_arguments
 def read_sweep(
     path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
-) -> tuple[SweepSettings, ...]:
+) -> tuple[SweepConfig, ...]:
     """The grids of a sweep file: the top one, and one for each `[[also]]`.
 
     Args:
@@ -54,7 +54,7 @@ def read_sweep(
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, *besides, "also"))
+    top = read_toml(path, "sweep file").fields(("scenario",), (*SWEEP_KEYS[1:], *_ALONE, *besides, "also"))
     tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
     first = {key: _value(key, node) for key, node in top.items() if key not in ("also", *besides)}
     grids = {str(path): first} | {
@@ -72,20 +72,18 @@ def _tables(node: JsonNode) -> Sequence[JsonNode]:
     return node.items("also")
 
 
-def _grid(name: str, values: Mapping[str, Any]) -> SweepSettings:
+def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
     """The grid of some values, which it checks itself."""
     try:
-        return SweepSettings(**in_python(values))
+        return SweepConfig(**in_python(values))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
 
 def _value(key: str, node: JsonNode) -> Any:
-    """What stands behind a key: a list of values, or one."""
+    """The values of a key."""
     if key not in _SEVERAL:
         return node.value if key not in _ALONE or _ALONE[key].is_text else node.number(0.0, above=True)
-    if isinstance(node.value, str):
-        return (node.value,)
     if not isinstance(node.value, list):
-        node.fail("a list is needed", f"write {key} = [...]")
+        return (node.value,)
     return tuple(tuple(entry) if isinstance(entry, list) else entry for entry in node.value)

@@ -8,7 +8,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.sweeps.grid import Batch
 from apo_bench.errors import require
-from apo_bench.records import KEY, Row, TrialSettings, row_key
+from apo_bench.records import KEY, TrialConfig, TrialRecord, record_key
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, versions
@@ -17,7 +17,7 @@ from apo_bench.trial.trial import trial_row
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
-Ended = tuple[Row, Timing]
+Ended = tuple[TrialRecord, Timing]
 
 
 @final
@@ -71,7 +71,7 @@ class Worker:
             ended = time.perf_counter()
             yield row, timing(row, compiled - start, shown - compiled, ended - shown, self._name)
 
-    def _scene(self, spec: TrialSettings) -> Scene:
+    def _scene(self, spec: TrialConfig) -> Scene:
         key = scene_key(spec)
         if key not in self._scenes:
             scene = scene_of(spec)
@@ -86,11 +86,15 @@ class Worker:
 
 
 def timing(
-    row: Row, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None, worker: Mapping[str, Any]
+    row: TrialRecord,
+    compile_s: float | None,
+    demonstrate_s: float | None,
+    trial_s: float | None,
+    worker: Mapping[str, Any],
 ) -> Timing:
     """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
     return {
-        **dict(zip(KEY, row_key(row), strict=True)),
+        **dict(zip(KEY, record_key(row), strict=True)),
         "compile_s": compile_s,
         "demonstrate_s": demonstrate_s,
         "trial_s": trial_s,

@@ -5,7 +5,7 @@ known plane. `believe` begins with what is stated of the robot, `RobotBelief.tou
 """
 
 from apo_bench.assembly.touch import Touch
-from apo_bench.correction.calibration.belief import UNSTATED, RobotBelief, believe, slip_sigmas
+from apo_bench.correction.calibration.belief import UNKNOWN, RobotBelief, believe, slip_sigmas
 from apo_bench.correction.calibration.robust_estimate import REFUSED_BEYOND
 
-__all__ = ("REFUSED_BEYOND", "UNSTATED", "RobotBelief", "Touch", "believe", "slip_sigmas")
+__all__ = ("REFUSED_BEYOND", "UNKNOWN", "RobotBelief", "Touch", "believe", "slip_sigmas")

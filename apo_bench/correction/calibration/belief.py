@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.assembly import Felt
+from apo_bench.assembly import ProbingResult
 from apo_bench.assembly.touch import Touch, checked_array, checked_pose
 from apo_bench.correction.calibration.robust_estimate import (
     HAND_EYE,
@@ -24,7 +24,7 @@ from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.records.robot_error import Sigmas
 
-UNSTATED = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
+UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
 """[mm, deg], where nobody states how wrong a robot is: a published automatic calibration of hand and eye ends at
 0.93 mm and 0.27 degrees (arXiv 2311.01335)."""
 
@@ -82,10 +82,10 @@ class RobotBelief:
         return tuple(touch for (touch, _), counts in zip(self.felt, self.taken, strict=True) if not counts)
 
     @property
-    def found(self) -> Felt:
+    def found(self) -> ProbingResult:
         """What has been found out, in short."""
         sure = self.deviation_mm, self.deviation_deg
-        return Felt(len(self.touches), len(self.refused), self.felt_mm, self.felt_deg, *sure)
+        return ProbingResult(len(self.touches), len(self.refused), self.felt_mm, self.felt_deg, *sure)
 
     @property
     def felt_mm(self) -> float:

@@ -17,7 +17,7 @@ from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.importers.assembly.touching import walls_without_play
 from apo_bench.importers.assembly.waiting import stance
 from apo_bench.io import read_bytes
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
 from apo_bench.simulation.arm_checks.arm_check import place_in_reach
 from apo_bench.simulation.arm_checks.plan_check import struck_by
@@ -217,9 +217,9 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
                 )
 
 
-def _ideal(path: Path, arm: str) -> TrialSettings:
+def _ideal(path: Path, arm: str) -> TrialConfig:
     """A trial in which the robot knows the truth."""
-    return TrialSettings(str(path), arm=arm, level_mm=0.0, level_deg=0.0, method="oracle")
+    return TrialConfig(str(path), arm=arm, noise_mm=0.0, noise_deg=0.0, method="oracle")
 
 
 def _base(scene: Scene) -> str:
@@ -227,7 +227,7 @@ def _base(scene: Scene) -> str:
     return f"({1e3 * scene.arm.base[0]:g}, {1e3 * scene.arm.base[1]:g})"
 
 
-def _trials(settings: TrialSettings, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[Finding]:
+def _trials(settings: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[Finding]:
     settings = replace(settings, clearance_mm=scene.clearance_mm)
     failed = 0
     for seed in range(seeds):

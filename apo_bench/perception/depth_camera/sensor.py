@@ -50,7 +50,9 @@ class RangeSensor:
                 goals[k] = event.found.T
                 covariance[k] = event.found.covariance
                 seen[k] = True
-        return Observation(assembly, demonstration.start, goals, floored(covariance + demonstration.careless), seen)
+        return Observation(
+            assembly, demonstration.start, goals, floored(covariance + demonstration.human_error_covariance), seen
+        )
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:
         """The images with the errors of the sensor, (views, height, width) each, [m]."""

@@ -65,7 +65,7 @@ def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
 
 
 def evidence_of(
-    assembly: Assembly, k: int, taken: Iterable[tuple[Contact, Facing, PairThresholds]], as_seen: Poses
+    assembly: Assembly, k: int, taken: Iterable[tuple[Contact, Facing, PairThresholds]], is_uncorrected: Poses
 ) -> list[Evidence]:
     """What speaks for the contacts of operation k, in the order of parts and faces.
 
@@ -85,6 +85,6 @@ def evidence_of(
     evidence = list[Evidence]()
     for contact, pair, most in sorted(taken, key=place):
         a, b = contact
-        seen_gap_m = face_gap(assembly.face_of(a), as_seen[a.part], assembly.face_of(b), as_seen[b.part])
+        seen_gap_m = face_gap(assembly.face_of(a), is_uncorrected[a.part], assembly.face_of(b), is_uncorrected[b.part])
         evidence.append(Evidence(contact, k, pair.gap_m, pair.angle_rad, pair.share, most, seen_gap_m))
     return evidence

@@ -201,11 +201,11 @@ def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
     """The best of the histories, with how likely it is, and the next best one."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
-    as_seen = placements(seen.assembly, seen.start, seen.goals)
+    is_uncorrected = placements(seen.assembly, seen.start, seen.goals)
     evidence = [
         [
             each
-            for k, (taken, poses) in enumerate(zip(history.taken, as_seen, strict=True))
+            for k, (taken, poses) in enumerate(zip(history.taken, is_uncorrected, strict=True))
             for each in evidence_of(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
         ]
         for history in kept[:2]

@@ -42,9 +42,9 @@ class Looks:
         Raises:
             InputError: The number is not allowed.
         """
-        check("looks", allowed)
+        check("max_reobservations", allowed)
         self.left = allowed
-        self.seen_again = 0
+        self.reobservations = 0
         """Operations that were looked at again, each as often as that was."""
         self._demonstration = demonstration
         self._noise = noise
@@ -62,7 +62,7 @@ class Looks:
         )
         look = observe(self._demonstration, self._later(), self._rng)
         self.left -= 1
-        self.seen_again += len(chosen)
+        self.reobservations += len(chosen)
         return replace(look, assembly=self._assembly, seen=look.seen & np.isin(np.arange(n), [*chosen]))
 
     def _later(self) -> Noise:

@@ -11,13 +11,13 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import RAISED, InputError, failed, require, unknown
 from apo_bench.names import resolve
-from apo_bench.perception.observation.models import Level
+from apo_bench.perception.observation.models import NoiseLevel
 from apo_bench.perception.observation.models.failures import make_failures
 from apo_bench.perception.observation.noise_file import noise_path, presets
 from apo_bench.perception.observation.plain import declared
 from apo_bench.records import FAILURES
 
-__all__ = ["FAILURES", "NOISES", "Level", "Noise", "make_noise"]
+__all__ = ["FAILURES", "NOISES", "Noise", "NoiseLevel", "make_noise"]
 Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 """Any function `(assembly, shown, rng) -> Observation` is a noise model."""
 NOISES = MappingProxyType(
@@ -39,7 +39,7 @@ _RATES = MappingProxyType({"p": "rate", "r": "repeat"})
 """What may be stated of a camera that fails now and then -> what it is called there."""
 
 
-def make_noise(given: Any, level: Level) -> Noise:
+def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
     """The noise model that a name stands for.
 
     Args:
@@ -54,7 +54,7 @@ def make_noise(given: Any, level: Level) -> Noise:
         InputError: There is no such noise model, it cannot be made or does not say how large its errors are, or the
             level is negative or not finite.
     """
-    for value, unit in zip(level, ("mm", "degrees"), strict=True):
+    for value, unit in zip(noise_level, ("mm", "degrees"), strict=True):
         require(
             math.isfinite(value) and value >= 0.0,
             f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.",
@@ -63,23 +63,23 @@ def make_noise(given: Any, level: Level) -> Noise:
         if noise_path(given) is not None:
             from apo_bench.perception.observation.noise_file import noise_of_file
 
-            if (measured := noise_of_file(given, level)) is not None:
+            if (measured := noise_of_file(given, noise_level)) is not None:
                 return measured
         if ":" not in given and given not in NOISES:
             raise InputError(_unknown(given, (*NOISES, *presets())))
         if given.partition(":")[0] in FAILURES:
-            return _failing(given, level)
+            return _failing(given, noise_level)
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
     try:
-        return _noise(model, name, level)
+        return _noise(model, name, noise_level)
     except InputError:
         raise
     except RAISED as error:
         raise failed(f"the noise model '{name}'", error) from error
 
 
-def _failing(given: str, level: Level) -> Noise:
+def _failing(given: str, noise_level: NoiseLevel) -> Noise:
     """A camera that fails now and then, as often as its name says: `flips:p=0.1/r=0.5`."""
     name, colon, stated = given.partition(":")
     entries = [entry.partition("=") for entry in stated.split("/")] if colon else []
@@ -91,13 +91,13 @@ def _failing(given: str, level: Level) -> Noise:
             f"the noise '{given}' was given; state how often the camera fails, '{name}:p=0.1', or also how often a "
             f"later look repeats a failure, '{name}:p=0.1/r=0.5'."
         ) from None
-    return make_failures(name, level, **rates)
+    return make_failures(name, noise_level, **rates)
 
 
-def _noise(model: Any, name: str, level: Level) -> Noise:
+def _noise(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
     """What can be called, from what a name stands for."""
     if isinstance(model, type):
-        model = model(level)
+        model = model(noise_level)
     plain = _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3))
     require(
         plain or _takes(model, 3),

@@ -15,8 +15,8 @@ from apo_bench.perception.observation.models import (
     ConstantError,
     Empirical,
     Fitted,
-    Level,
     MeasuredNoise,
+    NoiseLevel,
     Split,
     Tail,
     ViewNoise,
@@ -53,7 +53,7 @@ _HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
 
 
-def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
+def noise_of_file(name: str, noise_level: NoiseLevel) -> Fitted | Empirical | None:
     """The noise model of such a name, None if it is no such name.
 
     Raises:
@@ -63,9 +63,9 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
     if path is None:
         return None
     if name.startswith(RESIDUALS):
-        return empirical_noise(path, level)
+        return empirical_noise(path, noise_level)
     measured, camera = read_noise(path)
-    return Fitted(measured, level, camera)
+    return Fitted(measured, noise_level, camera)
 
 
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:

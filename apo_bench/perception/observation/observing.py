@@ -9,8 +9,8 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
-from apo_bench.perception.observation.noise import Level, Noise, make_noise
-from apo_bench.records import level_pair
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
+from apo_bench.records import noise_pair
 
 
 @check_arguments
@@ -19,7 +19,7 @@ def observe(
     noise: Noise | type | str,
     rng: np.random.Generator,
     *,
-    level: float | tuple[float, float] | None = None,
+    noise_level: float | tuple[float, float] | None = None,
 ) -> Observation:
     """What the noise model makes of a demonstration, checked.
 
@@ -34,10 +34,10 @@ def observe(
             demonstration, or a level was given for a noise model that is made already.
     """
     if isinstance(noise, str | type):
-        noise = make_noise(noise, Level(*level_pair(1.0 if level is None else level)))
-    elif level is not None:
+        noise = make_noise(noise, NoiseLevel(*noise_pair(1.0 if noise_level is None else noise_level)))
+    elif noise_level is not None:
         raise InputError(
-            f"the level {level!r} was given together with a noise model that is made already; leave the level out, or "
+            f"the level {noise_level!r} was given together with a noise model that is made already; leave the level out, or "
             "give the name or the class of the model."
         )
     name = getattr(noise, "__name__", type(noise).__name__)

@@ -42,7 +42,7 @@ class Plain:
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         goals = np.array(self.function(demonstration.goals.copy(), rng), dtype=np.float64)
         sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
-        stated = floored(np.diag(sigma**2) + demonstration.careless)
+        stated = floored(np.diag(sigma**2) + demonstration.human_error_covariance)
         return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
 

@@ -10,7 +10,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
+from apo_bench.records.settings import DEPTH_CAMERA, NOISE_LEVEL, SETTINGS
 from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS, WRONG
 from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
@@ -18,7 +18,7 @@ _SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
 _ALWAYS = ("clearance_mm", "method")
 """Said even if it is as usual."""
-_APART = ("scenario", "level_mm", "level_deg", "seed", "salt")
+_APART = ("scenario", "noise_mm", "noise_deg", "seed", "secret_seed")
 """Said in a way of its own."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
@@ -43,19 +43,19 @@ def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
         if value != default:
             words.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
 
-    measured = row["eye"] == RANGE
-    if measured or row["level"] == row["level_deg"]:
-        add(LEVEL.option, float(row["level"]), SETTINGS["level_mm"].default)
+    measured = row["pose_source"] == DEPTH_CAMERA
+    if measured or row["noise_mm"] == row["noise_deg"]:
+        add(NOISE_LEVEL.option, float(row["noise_mm"]), SETTINGS["noise_mm"].default)
     else:
-        for name in ("level_mm", "level_deg"):
+        for name in ("noise_mm", "noise_deg"):
             info = SETTINGS[name]
-            add(info.option, float(row[info.column]), info.default)
+            add(info.option, float(row[info.name]), info.default)
     for name, info in SETTINGS.items():
-        value = row.get(info.column, info.default)
+        value = row.get(info.name, info.default)
         if name in _APART or (name == "noise" and measured) or (value == info.default and name not in _ALWAYS):
             continue
         add(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
-    add(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)
+    add(SETTINGS["secret_seed"].option, _SALT_FILE if row.get("secret_seed") else None)
     if row.get("failure_stage") == "worker":
         add("trial-limit", limits.trial_s)
     return words
@@ -76,7 +76,7 @@ DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
     "method": (),
     "arm": FOREIGN_ARMS,
     "noise": (RESIDUALS, *(f"{name}:" for name in FAILURES)),
-    "relations": tuple(f"{kind}:" for kind in WRONG),
+    "contact_source": tuple(f"{kind}:" for kind in WRONG),
 }
 """Column -> how names with a colon begin that are data, and no code."""
 _MOST = 3

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_bytes, write_file
 from apo_bench.records.run.validation import run_of
-from apo_bench.records.salt import Salt
+from apo_bench.records.secret_seed import SecretSeed
 from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
 _RUN = "apo-bench/run/3"
@@ -24,7 +24,7 @@ def run_record(
     versions: Mapping[str, str],
     files: Mapping[str, str],
     command: str,
-    salt: Salt | None = None,
+    secret_seed: SecretSeed | None = None,
     limits: Limits = USUAL_LIMITS,
 ) -> dict[str, Any]:
     """What `run.json` says.
@@ -40,7 +40,7 @@ def run_record(
         "schema": _RUN,
         "grids": list(grids),
         "files": dict(files),
-        "salt": None if salt is None else salt.hash,
+        "secret_seed": None if secret_seed is None else secret_seed.hash,
         "limits": {"trial_s": limits.trial_s},
         "content": dict(content),
         "versions": dict(versions),

@@ -15,10 +15,10 @@ from typing import IO, Any, Self, final
 
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, each_line, is_there, open_to_append, put_back
-from apo_bench.records.row import Key, Row, row_key
+from apo_bench.records.record import Key, TrialRecord, record_key
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import row_of, unwritable
-from apo_bench.records.salt import check_same_salt
+from apo_bench.records.secret_seed import check_same_secret_seed
 
 CHUNK = 1 << 16
 
@@ -36,7 +36,7 @@ class RunFolder:
         self.folder = folder
         self._run = run
         self.finished: dict[Key, str] = {}
-        """The trials that have a row, and its `spec_hash`."""
+        """The trials that have a row, and its `config_hash`."""
         try:
             self._place = folder.absolute()
             folder.mkdir(parents=True, exist_ok=True)
@@ -84,11 +84,11 @@ class RunFolder:
                 f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
                 f"{len(self.finished)} before it are kept, and the same command continues once there is room."
             ) from error
-        self.finished[row_key(row)] = row["spec_hash"]
+        self.finished[record_key(row)] = row["config_hash"]
         with suppress(OSError):
             _append(self._timing.fileno(), timing)
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TrialRecord]:
         """All rows of the folder."""
         self._keep()
         return read_rows(self._place)
@@ -118,13 +118,13 @@ class RunFolder:
 
     def _read(self, run: Mapping[str, Any]) -> None:
         for row in each_row(self.folder):
-            check_same_salt(f"'{self.folder}'", run.get("salt"), row["salt"])
-            self.finished[row_key(row)] = row["spec_hash"]
+            check_same_secret_seed(f"'{self.folder}'", run.get("secret_seed"), row["secret_seed"])
+            self.finished[record_key(row)] = row["config_hash"]
         if self.finished:
             check_same(self.folder, run)
 
 
-def read_rows(folder: str | Path) -> list[Row]:
+def read_rows(folder: str | Path) -> list[TrialRecord]:
     """The rows of a sweep, in the order in which they ended; a torn last line is left out.
 
     Raises:
@@ -133,7 +133,7 @@ def read_rows(folder: str | Path) -> list[Row]:
     return list(each_row(folder))
 
 
-def each_row(folder: str | Path) -> Iterator[Row]:
+def each_row(folder: str | Path) -> Iterator[TrialRecord]:
     """The rows of a folder one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
     require(

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array
-from apo_bench.records.row import ROW_FIELDS
+from apo_bench.records.record import RECORD_FIELDS
 from apo_bench.records.run.run_folder import each_row
-from apo_bench.records.salt import one_salt
+from apo_bench.records.secret_seed import common_secret_seed
 from apo_bench.records.settings import SETTINGS
 
 Mask = NDArray[np.bool_]
@@ -27,10 +27,19 @@ Mask = NDArray[np.bool_]
 Index = NDArray[np.integer[Any]]
 """(n,) numbers of trials, or of what they have."""
 _NOT_KEPT = (
-    *("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "free_moved", "moved_in_hand", "reached"),
-    "predicted",  # has columns of its own
+    *(
+        "env_id",
+        "thresholds",
+        "as_demonstrated_code",
+        "conditions",
+        "tried_corrections",
+        "fit_adjustments",
+        "grasp_slip",
+        "reached",
+    ),
+    "failure_prediction",  # has columns of its own
 )
-_USUAL = {info.column: info.default for name, info in SETTINGS.items() if name != "scenario"}
+_USUAL = {info.name: info.default for name, info in SETTINGS.items() if name != "scenario"}
 _PLAIN = {msgspec.inspect.FloatType: float, msgspec.inspect.IntType: int, msgspec.inspect.BoolType: bool}
 
 
@@ -42,7 +51,7 @@ def _kind(annotation: Any) -> type | None:
 
 
 COLUMNS: Mapping[str, type | None] = {
-    **{name: _kind(annotation) for name, annotation in ROW_FIELDS.items() if name not in _NOT_KEPT},
+    **{name: _kind(annotation) for name, annotation in RECORD_FIELDS.items() if name not in _NOT_KEPT},
     "predicted_fails": bool,
     "predicted_operation": int,
     "predicted_code": None,
@@ -84,13 +93,13 @@ class Trials:
     def __len__(self) -> int:
         return len(self.numbers["seed"])
 
-    def find_salt(self) -> str | None:
+    def find_secret_seed(self) -> str | None:
         """The hash of the salt that all trials were drawn with.
 
         Raises:
             InputError: They were drawn with several, so that their seeds are different trials.
         """
-        return one_salt({"salt": salt} for salt in self.distinct("salt"))
+        return common_secret_seed({"secret_seed": secret_seed} for secret_seed in self.distinct("secret_seed"))
 
     def number(self, name: str) -> Array:
         """(n,) a column of numbers."""
@@ -154,7 +163,11 @@ def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
     codes: dict[str, array[int]] = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
     names: dict[str, dict[Any, int]] = {name: {} for name in codes}
     for record in records:
-        said = _USUAL | dict(record) | {f"predicted_{key}": x for key, x in (record.get("predicted") or {}).items()}
+        said = (
+            _USUAL
+            | dict(record)
+            | {f"predicted_{key}": x for key, x in (record.get("failure_prediction") or {}).items()}
+        )
         for name, numbered in numbers.items():
             number = said.get(name)
             numbered.append(math.nan if number is None else number)

@@ -22,8 +22,8 @@ from apo_bench.io import (
     is_whole,
     read_whole,
 )
-from apo_bench.records.row import KEY, REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.settings import ROW, Name
+from apo_bench.records.record import KEY, RECORD_FIELDS, REQUIRED, TrialRecord
+from apo_bench.records.settings import RECORD_SCHEMA, Name
 
 _Text = Annotated[str, Meta(max_length=100_000)]
 _Plain = None | bool | int | float | _Text
@@ -42,7 +42,7 @@ RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
         "python": _Text,
         "platform": _Text,
         "command": _Text,
-        "salt": _Text,
+        "secret_seed": _Text,
         "limits": dict[Name, Annotated[float, Meta(gt=0.0, le=1e9)] | None],  # wall times [s]
         "code": _Texts,
     }
@@ -51,7 +51,7 @@ RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
 _Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
 TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
     {
-        **{name: ROW_FIELDS[name] for name in KEY},
+        **{name: RECORD_FIELDS[name] for name in KEY},
         **dict.fromkeys(("compile_s", "demonstrate_s", "trial_s"), _Seconds),
         "host": Name,
         "worker": int | Name,
@@ -59,19 +59,26 @@ TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
 )
 """Of a line of `timing.jsonl`."""
 _NAMES = (
-    *("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye"),
-    *("robot_error", "wrench", "stated_error"),
+    *("scenario", "noise", "contact_source", "grasp", "arm", "method", "config_hash", "pose_source"),
+    *("robot_error", "ft_sensor", "assumed_robot_error"),
 )
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
 _TOGETHER = (
-    ("level", "level_deg", "careless"),
+    ("noise_mm", "noise_deg", "human_error_scale"),
     ("success", "loose_success"),
     ("as_demonstrated", "success"),
-    ("contacts_right", "contacts_missed", "contacts_false"),
+    ("contacts_true_positive", "contacts_false_negative", "contacts_false_positive"),
     ("planned_error_fixed_mm", "planned_error_free_mm"),
     ("pose_error_fixed_mm", "pose_error_free_mm"),
     ("test_passes", "suspects"),
-    ("touches", "touches_refused", "felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg"),
+    (
+        "probe_contacts",
+        "probe_contacts_rejected",
+        "base_error_estimate_mm",
+        "base_error_estimate_deg",
+        "base_error_std_mm",
+        "base_error_std_deg",
+    ),
 )
 """Fields that are null together."""
 _LONGEST_QUOTE = 60
@@ -92,14 +99,14 @@ def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), 
     return msgspec.defstruct(name, columns, kw_only=True, gc=False, **more)
 
 
-_ROW = msgspec.json.Decoder(_struct("Row", ROW_FIELDS, REQUIRED))
+_ROW = msgspec.json.Decoder(_struct("TrialRecord", RECORD_FIELDS, REQUIRED))
 _TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
-_WRITTEN = _struct("Written", ROW_FIELDS, REQUIRED, forbid_unknown_fields=True)
+_WRITTEN = _struct("Written", RECORD_FIELDS, REQUIRED, forbid_unknown_fields=True)
 _RUN = msgspec.json.Decoder(dict[str, Any])
 _KNOWN = _struct("Run", RUN_FIELDS)
 
 
-def row_of(line: bytes, where: str) -> Row:
+def row_of(line: bytes, where: str) -> TrialRecord:
     """The row of a line, with every field of the table, null where the line does not say.
 
     Args:
@@ -109,13 +116,15 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] != ROW:
-        raise InputError(f"{where}: a row of schema '{_short(row['schema'])}' was given; only {ROW} can be read.")
+    if row["schema"] != RECORD_SCHEMA:
+        raise InputError(
+            f"{where}: a row of schema '{_short(row['schema'])}' was given; only {RECORD_SCHEMA} can be read."
+        )
     fault = _fault(row)
     if fault is not None:
         raise _wrong(where, *fault)
     row["sentence"] = row["sentence"] and clean(row["sentence"])
-    return cast(Row, row)
+    return cast(TrialRecord, row)
 
 
 def timing_of(line: bytes, where: str) -> dict[str, Any]:
@@ -198,8 +207,8 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
         return "failure_stage", "success is false, so failure_stage and failure_code are needed"
     if row["success"] and (row["failure_stage"], row["failure_code"]) != (None, None):
         return "failure_stage", "success is true, so failure_stage and failure_code are null"
-    if row["success"] and None in (row.get("sim_seconds"), row.get("extra_operations")):
-        return "sim_seconds", "success is true, so sim_seconds and extra_operations are needed"
+    if row["success"] and None in (row.get("sim_time_s"), row.get("extra_operations")):
+        return "sim_time_s", "success is true, so sim_seconds and extra_operations are needed"
     return None
 
 

@@ -112,7 +112,7 @@ _AT_LIMIT_RAD = np.radians(0.5)
 _Refused = Literal["unreachable_start", "unreachable"]
 
 
-def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove, ...]:
+def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, ...]:
     """Every transfer of a plan as the arm of a scene would do it.
 
     Of the usual arm, and of an `Arm` that was made without a description, only reach is looked at: predictions
@@ -123,7 +123,7 @@ def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove
     """
     predicted = list[ArmMove]()
     believed = plan.start
-    for move in moves(plan, scene, searches):
+    for move in moves(plan, scene, spiral):
         operation = plan.assembly.operations[move.step.operation]
         after = after_transfer(operation, move.transfer.T_world_goal, believed)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]

@@ -101,12 +101,12 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
         require(
             sorted(description.joints) == sorted(names),
             f"{description.file}: 'joints' are {', '.join(description.joints)}; between base and flange lie "
-            f"{', '.join(names) or 'none'}.",
+            f"{', '.join(names) or 'uncorrected'}.",
         )
         names = [name for name in names if name in description.joints]
     require(
         _LEAST_JOINTS <= len(names) <= _MOST_JOINTS,
-        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
+        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'uncorrected'}); "
         f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'.",
     )
     return names

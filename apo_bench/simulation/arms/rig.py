@@ -115,7 +115,9 @@ def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], gripper: G
     if gripper.actuators is not None:
         known = [model.actuator(i).name for i in range(model.nu)]
         if missing := [name for name in gripper.actuators if name not in known]:
-            raise InputError(f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'none'}.")
+            raise InputError(
+                f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'uncorrected'}."
+            )
         return np.array([model.actuator(name).id for name in gripper.actuators])
     moment = np.zeros((model.nu, model.nv))
     if model.nu:

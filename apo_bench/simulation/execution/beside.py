@@ -25,7 +25,7 @@ from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, shifted, turn_from, with_height
 from apo_bench.simulation.scene import Scene
 
-LEVEL = float(np.cos(np.radians(10.0)))
+NOISE_LEVEL = float(np.cos(np.radians(10.0)))
 """A face that looks up by less than ten degrees off is one to lie on."""
 _LOWEST_M = 1e-4
 """Corners this near to the lowest one lie on the floor."""
@@ -66,7 +66,7 @@ def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -
         each
         for part in assembly.fixed
         for face in assembly.solids[part].faces.values()
-        if believed[part][2, :3] @ face.normal > LEVEL
+        if believed[part][2, :3] @ face.normal > NOISE_LEVEL
         for each in [_on(scene, t.part, T, up, face, believed[part])]
         if each is not None and each.T[2, 3] < T[2, 3]
     ]
@@ -164,7 +164,7 @@ def upright_walls(assembly: Assembly, poses: Poses) -> Iterator[tuple[str, Face]
                 named = [of.face] if of.face in solid.faces else list(solid.faces)
                 for name in named:
                     face = solid.faces[name]
-                    upright = abs(float(poses[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - LEVEL**2)
+                    upright = abs(float(poses[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - NOISE_LEVEL**2)
                     if upright and (of.part, name) not in done:
                         done.add((of.part, name))
                         yield of.part, face

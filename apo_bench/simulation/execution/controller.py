@@ -13,7 +13,7 @@ from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.records import sentence, touching_sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
-from apo_bench.simulation.execution.probing.feeling import Feeling, Feels
+from apo_bench.simulation.execution.probing.feeling import ProbingConfig, ProbingState
 from apo_bench.simulation.execution.probing.touching import find_out
 from apo_bench.simulation.execution.probing.touching import lay as lay_down
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
@@ -48,17 +48,17 @@ def replay(
     parts_at: Poses | None = None,
     fidelity: str = "full",
     cache: ReplayCache | None = None,
-    searches: bool = False,
+    spiral: bool = False,
     most_s: float = math.inf,
     error: RobotError | None = None,
-    feels: Feels | None = None,
+    probing: ProbingConfig | None = None,
 ) -> ReplayResult:
     """Carry out a plan.
 
     Args:
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
-        fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out. With a grasp by
+        fidelity: `full`, or `near-contact`: stretches of a motion on which nothing is near are left out. With a grasp by
             friction, what rests untouched sleeps in both.
         cache: What replays of this scene have in common; changes nothing but the time it takes.
         searches: The robot feels for a hole where a motion into it is stopped by force.
@@ -66,9 +66,9 @@ def replay(
         error: What is wrong with the robot; it goes by the plan as if nothing were.
         feels: How a robot finds out what is wrong with it, by what it touches; None: it does not.
     """
-    feeling = None if feels is None else Feeling(feels, plan, scene, error)
-    acts = () if feels is None else feels.acts
-    prepared = partial(moves_of, plan, scene, searches or "search" in acts, acts)
+    feeling = None if probing is None else ProbingState(probing, plan, scene, error)
+    acts = () if probing is None else probing.acts
+    prepared = partial(moves_of, plan, scene, spiral or "search" in acts, acts)
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > most_s:
         todo: tuple[Move, ...] = ()
@@ -92,7 +92,7 @@ def replay(
         reached=Reached(after=tuple(progress.after), final=final),
         outcome=outcome,
         peak_force_n=robot.forces.peak_n,
-        sim_seconds=float(robot.data.time),
+        sim_time_s=float(robot.data.time),
         timeline=tuple(progress.timeline),
         in_hand=robot.hold_watch.finished,
         felt=None if feeling is None else feeling.belief.found,
@@ -103,12 +103,12 @@ def replay(
 
 
 def moves_of(
-    plan: Plan, scene: Scene, searches: bool, acts: tuple[str, ...], error: RobotError | None
+    plan: Plan, scene: Scene, spiral: bool, acts: tuple[str, ...], error: RobotError | None
 ) -> tuple[Move, ...]:
     """The moves of a plan, as a robot carries them out whose base and tool are not where it believes them."""
     if error is None:
-        return moves(plan, scene, searches, acts)
-    planned = moves(error.plan(plan), scene, searches, acts)
+        return moves(plan, scene, spiral, acts)
+    planned = moves(error.plan(plan), scene, spiral, acts)
     return tuple(Move(step, transfer.with_tip_at(error.tool)) for step, transfer in planned)
 
 
@@ -132,7 +132,7 @@ def run_schedule(
     cache: ReplayCache,
     keys: list[bytes],
     most_s: float,
-    feeling: Feeling | None,
+    feeling: ProbingState | None,
     prepared: Callable[[RobotError | None], tuple[Move, ...]],
 ) -> Outcome:
     """One step of the schedule after the other, from the furthest state that the cache has.

@@ -58,7 +58,7 @@ class Move(NamedTuple):
 
 
 @remembered
-def moves(plan: Plan, scene: Scene, searches: bool = False, acts: tuple[str, ...] = ()) -> tuple[Move, ...]:
+def moves(plan: Plan, scene: Scene, spiral: bool = False, acts: tuple[str, ...] = ()) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part is believed to stay with it.
 
     Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
@@ -86,7 +86,7 @@ def moves(plan: Plan, scene: Scene, searches: bool = False, acts: tuple[str, ...
             before.setdefault(k, (believed[operation.main], was))
             put_by[operation.main] = k
         after = after_transfer(operation, target, believed)
-        transfer = _transfer(plan.assembly, scene, step, was, target, believed, after, searches)
+        transfer = _transfer(plan.assembly, scene, step, was, target, believed, after, spiral)
         if acts and not (step.undo or transfer.carried):
             transfer = _with_acts(plan.assembly, scene, k, transfer, believed, acts)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
@@ -117,7 +117,7 @@ def _transfer(
     target: Array,
     believed: Poses,
     after: Poses,
-    searches: bool,
+    spiral: bool,
 ) -> Transfer:
     """One step as the robot will carry it out.
 
@@ -171,7 +171,7 @@ def _transfer(
         insert_n=_INSERT_WEIGHTS * min(near, default=held),
         slide_n=_SLIDE_WEIGHTS * min(near, default=held),
         clearance=1e-3 * scene.clearance_mm,
-        front=_front(scene, part, operation.moves, after, into.way) if searches and inserts else None,
+        front=_front(scene, part, operation.moves, after, into.way) if spiral and inserts else None,
     )
 
 

@@ -21,9 +21,9 @@ from apo_bench.planning.insertion.macros import UP
 from apo_bench.planning.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.records import sentence
 from apo_bench.scenario import (
-    Carelessness,
+    HumanError,
     Scenario,
-    careless_covariance,
+    human_error_covariance,
     nominal_operations,
     spread_error,
 )
@@ -242,7 +242,7 @@ def demonstrate(
             default 20 ms; or several `Hooks`. The demonstration is the same with and without it.
     """
     scenario = scene.scenario
-    error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
+    error = spread_error(scenario, layout, _draw(scenario.human_error, human_error, rng))
     hands = Hands(scene, layout.start, watch)
     try:
         after = _assemble(scene, layout, hands, error)
@@ -263,7 +263,7 @@ def demonstrate(
         start=layout.start,
         goals=goals,
         final=final,
-        careless=careless_covariance(scenario, human_error),
+        human_error_covariance=human_error_covariance(scenario, human_error),
         code="demonstration_failed" if why else "ok",
         why=why,
         gap_m=1e-3 * scenario.gap_mm,
@@ -289,7 +289,7 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
     return [*after, snapshot(scene.shown, hands.data, layout.start)]
 
 
-def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator) -> Array:
+def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) -> Array:
     """The offset of the careless operation, (3,) [m], in the part's own frame."""
     sign = rng.choice([-1.0, 1.0])
     size = rng.uniform(0.0, 1.0)

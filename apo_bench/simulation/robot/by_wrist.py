@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.records import wrench_noise
+from apo_bench.records import ft_noise
 from apo_bench.simulation.robot.paths import Trajectory, shifted
 from apo_bench.simulation.robot.reach import turned_by
 from apo_bench.simulation.robot.robot import Robot
@@ -58,7 +58,7 @@ def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: fl
     Raises:
         InputError: An unknown name, or a number that is not allowed.
     """
-    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
+    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, ft_noise(name), rng, bandwidth_hz)
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """Which part of a motion is rich in contact: where the hand, or what it holds, is near anything else.
 
-Asked by the hands that demonstrate, and by the robot only at `--fidelity contact`. It looks at the state of the
+Asked by the hands that demonstrate, and by the robot only at `--fidelity near-contact`. It looks at the state of the
 simulation, as the physics does; no command of the robot depends on it. Boxes that a
 separating axis keeps apart by less than `NEAR_HELD_M` are near, which is never too few.
 """

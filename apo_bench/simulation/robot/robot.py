@@ -4,7 +4,7 @@ Every physics step of a replay is taken in `_tick`, where motions come by `_run`
 `nudge`, for motions of which each depends on what was felt in the one before it. The robot knows what it commanded, its
 own joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads
 or sets poses of parts is the simulation's own: `_look` and `slip` shift them in the hand, `in_hand` records that, and
-`follow` and `fingers` leave out steps while nothing is near (fidelity `contact`). One class: these share steps.
+`follow` and `fingers` leave out steps while nothing is near (fidelity `near-contact`). One class: these share steps.
 """
 
 import math

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.records import WrenchNoise
+from apo_bench.records import FtNoise
 from apo_bench.scenario.parts import read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
@@ -176,14 +176,14 @@ def low_pass_part(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
     return 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
 
 
-def felt_noise(noise: WrenchNoise, part: float) -> WrenchNoise:
+def felt_noise(noise: FtNoise, part: float) -> FtNoise:
     """What a low pass leaves of the noise: y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
 
     Args:
         part: a, how much of a new reading goes into what is felt.
     """
     left = math.sqrt(part / (2.0 - part))
-    return WrenchNoise(left * noise.force_n, left * noise.torque_nm)
+    return FtNoise(left * noise.force_n, left * noise.torque_nm)
 
 
 @final
@@ -195,7 +195,7 @@ class WristSensor:
         scene: Scene,
         sensordata: Array,
         encoders: Callable[[], Array],
-        noise: WrenchNoise,
+        noise: FtNoise,
         rng: np.random.Generator,
         bandwidth_hz: float = BANDWIDTH_HZ,
     ) -> None:
@@ -230,7 +230,7 @@ class WristSensor:
     @property
     def sigma(self) -> tuple[float, float]:
         """Standard deviation of what is felt behind the low pass, per axis, [N] and [Nm]."""
-        return felt_noise(WrenchNoise(*self._sigma[[0, 3]].tolist()), self._part)
+        return felt_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:
         """Say what is in the hand, or nothing, as it is believed (`part_loads`); its weight is not felt then."""

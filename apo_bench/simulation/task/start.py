@@ -28,7 +28,7 @@ from apo_bench.simulation.execution import (
     take,
     take_up,
 )
-from apo_bench.simulation.execution.probing.feeling import Feeling, Feels
+from apo_bench.simulation.execution.probing.feeling import ProbingConfig, ProbingState
 from apo_bench.simulation.execution.probing.touching import lay
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
@@ -65,8 +65,8 @@ def prepare(
     scene: Scene,
     k: int,
     error: RobotError | None = None,
-    feels: Feels | None = None,
-    wrench: tuple[str, tuple[int, ...]] = ("none", (0,)),
+    probing: ProbingConfig | None = None,
+    wrench: tuple[str, tuple[int, ...]] = ("uncorrected", (0,)),
 ) -> Start | Outcome:
     """Carry out a plan up to where the guarded motion of an operation begins; or say what failed before.
 
@@ -75,8 +75,8 @@ def prepare(
         feels: How the robot finds out first what is wrong with it; None: it does not.
         wrench: The sensor at the wrist, by name, and the seed of its noise.
     """
-    feeling = None if feels is None else Feeling(feels, plan, scene, error)
-    acts = () if feels is None else feels.acts
+    feeling = None if probing is None else ProbingState(probing, plan, scene, error)
+    acts = () if probing is None else probing.acts
     at = max(i for i, step in enumerate(plan.schedule) if step.operation == k and not step.undo)
     moves = partial(moves_of, plan, scene, True, acts)
     robot = Robot(scene, plan.start, Hooks(), "contact", error)
@@ -120,7 +120,7 @@ def _held(
     plan: Plan,
     robot: Robot,
     move: Move,
-    feeling: Feeling | None,
+    feeling: ProbingState | None,
     left: RobotError | None,
     wrench: tuple[str, tuple[int, ...]],
     progress: Progress,

@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import calibrations
 from apo_bench.benchmark.report.tables.methods import calibration_table
-from apo_bench.records import ROW_FIELDS
+from apo_bench.records import RECORD_FIELDS
 from apo_bench.records.run.run_folder import read_rows
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -24,9 +24,13 @@ def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: A
 
 
 def test_calibration_counts_coverage_alarms_and_culprits() -> None:
-    wrong = {"relations": "shifted:3", "wrong_relation": "R2"}
+    wrong = {"contact_source": "shifted:3", "wrong_contact": "R2"}
     rows = [
-        *(row("oracle", seed=0), row("none", seed=0), row(seed=0, level=None, level_deg=None, careless=None)),
+        *(
+            row("oracle", seed=0),
+            row("uncorrected", seed=0),
+            row(seed=0, noise_mm=None, noise_deg=None, human_error_scale=None),
+        ),
         *(
             corrected(0, True),
             corrected(1, False, ("R1",)),
@@ -38,10 +42,15 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
             corrected(1, False, ("R1", "R2"), **wrong),
             corrected(2, False, ("R3",), **wrong),
         ),
-        corrected(3, False, ("R3",), **wrong | {"relations": "missed", "wrong_relation": None}),
+        corrected(3, False, ("R3",), **wrong | {"contact_source": "false-negative", "wrong_contact": None}),
     ]
     raw, right, missed, shifted = calibrations(rows)
-    assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == ["none", (0, 0), (0, 0), None]
+    assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == [
+        "uncorrected",
+        (0, 0),
+        (0, 0),
+        None,
+    ]
     assert [right[name] for name in ("covered", "failed_tests", "culprits")] == [(1, 2), (1, 3), (0, 0)]
     assert right["fixed_mm"] == pytest.approx(math.sqrt((0.09 + 0.16 + 0.25) / 3))
     assert right["fixed_over_clearance"] == pytest.approx(right["fixed_mm"] / 0.25)
@@ -55,6 +64,6 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
     folder = write(tmp_path / "new", [row()])
-    assert read_rows(folder) == [dict.fromkeys(ROW_FIELDS) | row()]
+    assert read_rows(folder) == [dict.fromkeys(RECORD_FIELDS) | row()]
     with pytest.raises(InputError, match="a row of schema 'apo-bench/row/8' was given"):
         read_rows(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))

@@ -19,7 +19,7 @@ LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 def made(rates: tuple[float, ...], levels: tuple[float, ...] = LEVELS, seeds: int = 40) -> HalfLevel:
     """Of seeds that bear more or less: a seed that fails at one level fails at all worse ones."""
     pairs = zip(levels, rates, strict=True)
-    rows = [row("contact", i, i < r * seeds, level=x, level_deg=x) for x, r in pairs for i in range(seeds)]
+    rows = [row("contact", i, i < r * seeds, noise_mm=x, noise_deg=x) for x, r in pairs for i in range(seeds)]
     (found,) = half_levels(tally(rows))
     return found
 
@@ -35,19 +35,19 @@ def made(rates: tuple[float, ...], levels: tuple[float, ...] = LEVELS, seeds: in
 )
 def test_outside_the_levels_it_is_censored(rates: tuple[float, ...], text: str, surely: str) -> None:
     found = made(rates)
-    assert (found.level, found.text, found.sure_text) == (None, text, surely)
+    assert (found.noise_mm, found.text, found.sure_text) == (None, text, surely)
 
 
 def test_where_all_turns_to_nothing_it_lies_in_the_middle_and_surely_between_both_levels() -> None:
     found = made((1, 1, 1, 0, 0, 0, 0))
-    assert found.level == pytest.approx(np.sqrt(0.25 * 0.5))
+    assert found.noise_mm == pytest.approx(np.sqrt(0.25 * 0.5))
     assert (found.surely_over, found.surely_under, found.sure_text) == (0.25, 0.5, "0.25 to 0.5")
 
 
 @pytest.mark.parametrize("half", [0.4, 1.2, 2.5])
 def test_many_seeds_find_the_truth(half: float) -> None:
     found = made(tuple(expit(3 * np.log(half / np.array(LEVELS[1:])))), LEVELS[1:], 400)
-    assert found.level == pytest.approx(half, rel=0.05)
+    assert found.noise_mm == pytest.approx(half, rel=0.05)
     assert (found.surely_over or 0.0) < half < (found.surely_under or 9.0)
 
 
@@ -59,8 +59,8 @@ def test_it_knows_no_unit(right: list[int], factor: float) -> None:
     a = made(rates, levels, 20)
     b = made(rates, tuple(factor * x for x in levels), 20)
     assert a.beyond == b.beyond
-    assert (a.level is None) == (b.level is None)
-    assert a.level is None or factor * a.level == pytest.approx(b.level)
+    assert (a.noise_mm is None) == (b.noise_mm is None)
+    assert a.noise_mm is None or factor * a.noise_mm == pytest.approx(b.noise_mm)
 
 
 @settings(max_examples=40, deadline=None)
@@ -74,9 +74,9 @@ def test_sure_bounds_stop_at_the_first_test_that_does_not_reject(right: list[int
 
 
 def test_only_levels_of_as_many_degrees_as_mm_are_on_a_curve() -> None:
-    rows = [row("contact", seed, seed > 2, level=x, level_deg=x) for seed in range(8) for x in (0.5, 1.0)]
-    rows += [row("contact", 0, None, level=2.0, level_deg=2.0), row("contact", 9, level=4.0, level_deg=1.0)]
+    rows = [row("contact", seed, seed > 2, noise_mm=x, noise_deg=x) for seed in range(8) for x in (0.5, 1.0)]
+    rows += [row("contact", 0, None, noise_mm=2.0, noise_deg=2.0), row("contact", 9, noise_mm=4.0, noise_deg=1.0)]
     (found,) = half_levels(tally([*rows, row("oracle"), row("paper", 1)]))
     assert (found.place.method, found.largest, found.trials) == ("contact", 1.0, 16)
-    ranged = [row("contact", 0, noise="range", level=x, level_deg=0.0) for x in (1.0, 2.0)]
+    ranged = [row("contact", 0, noise="depth-camera", noise_mm=x, noise_deg=0.0) for x in (1.0, 2.0)]
     assert [h.largest for h in half_levels(tally(ranged))] == [2.0]

@@ -105,18 +105,18 @@ def test_adjustment_only_raises_and_keeps_the_order(p: list[float]) -> None:
 def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
     """`none` against `paper` and `paper` against `none` are one of three comparisons, not two of four."""
     found = {(p.place.method, p.reference): p for p in paired(rows())}
-    assert found["none", "paper"].p == found["paper", "none"].p == mcnemar(7, 0)
-    assert found["none", "paper"].p_adjusted == found["paper", "none"].p_adjusted
+    assert found["uncorrected", "paper"].p == found["paper", "uncorrected"].p == mcnemar(7, 0)
+    assert found["uncorrected", "paper"].p_adjusted == found["paper", "uncorrected"].p_adjusted
     raised = holm({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
-    assert [found[k].p_adjusted for k in (("contact", "paper"), ("contact", "none"), ("paper", "none"))] == [
-        *raised.values()
-    ]
+    assert [
+        found[k].p_adjusted for k in (("contact", "paper"), ("contact", "uncorrected"), ("paper", "uncorrected"))
+    ] == [*raised.values()]
 
 
 def test_what_is_mended_and_what_is_spoilt() -> None:
     """The raw replay is right at seeds 0 to 3 of 10, the corrected one at 2 to 7: two spoilt of 4, four mended of 6."""
-    given = [row("none", i, i < 4) for i in range(10)] + [row("contact", i, 2 <= i < 8) for i in range(10)]
-    (pair,) = [p for p in paired(given) if (p.place.method, p.reference) == ("contact", "none")]
+    given = [row("uncorrected", i, i < 4) for i in range(10)] + [row("contact", i, 2 <= i < 8) for i in range(10)]
+    (pair,) = [p for p in paired(given) if (p.place.method, p.reference) == ("contact", "uncorrected")]
     assert (pair.both, pair.neither, pair.pairs) == (2, 2, 10)
     assert (pair.recovered, pair.harmed) == ((4, 6), (2, 4))
     assert (pair.recovered.rate, pair.harmed.interval) == (4 / 6, wilson(2, 4))
@@ -125,18 +125,18 @@ def test_what_is_mended_and_what_is_spoilt() -> None:
 @settings(max_examples=15, deadline=None)
 @given(results=st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=30), order=st.randoms())
 def test_pairs_add_up_in_any_order(results: list[tuple[bool, bool]], order: Any) -> None:
-    given = [row(m, i, r[k]) for i, r in enumerate(results) for k, m in enumerate(("contact", "none"))]
+    given = [row(m, i, r[k]) for i, r in enumerate(results) for k, m in enumerate(("contact", "uncorrected"))]
     shuffled = list(given)
     order.shuffle(shuffled)
-    (pair,) = paired(given, ("none",))
-    assert (pair,) == paired(shuffled, ("none",))
+    (pair,) = paired(given, ("uncorrected",))
+    assert (pair,) == paired(shuffled, ("uncorrected",))
     assert pair.recovered.trials + pair.harmed.trials == pair.pairs == len(results)
     assert pair.both + pair.neither + pair.only_method + pair.only_reference == pair.pairs
 
 
 def rows() -> list[dict[str, Any]]:
     """Ten seeds: the method right at 8, the paper at 6 of them and at one of its own, `none` at none."""
-    right = {"contact": set(range(8)), "paper": {0, 1, 2, 3, 4, 5, 9}, "none": set()}
+    right = {"contact": set(range(8)), "paper": {0, 1, 2, 3, 4, 5, 9}, "uncorrected": set()}
     errors = {"contact": 1.0, "paper": 1.5, "none": 2.0}
     noise = np.random.default_rng(3).normal(0, 0.1, (10, 3))
     return [
@@ -148,20 +148,25 @@ def rows() -> list[dict[str, Any]]:
 
 def test_discordant_pairs_are_counted_both_ways() -> None:
     found = {(p.place.method, p.reference): p for p in paired([*rows(), row("oracle")])}
-    assert set(found) == {("contact", "paper"), ("contact", "none"), ("paper", "none"), ("none", "paper")}
+    assert set(found) == {
+        ("contact", "paper"),
+        ("contact", "uncorrected"),
+        ("paper", "uncorrected"),
+        ("uncorrected", "paper"),
+    }
     pair = found["contact", "paper"]
     assert (pair.pairs, pair.only_method, pair.only_reference, pair.difference) == (10, 2, 1, 0.1)
     assert pair.interval == tango(2, 1, 10)
-    back = found["none", "paper"]
+    back = found["uncorrected", "paper"]
     assert (back.only_method, back.only_reference, back.difference) == (0, 7, -0.7)
 
 
 def test_free_errors_are_compared_pair_by_pair() -> None:
     pair = paired(rows())[0]
-    errors = {m: [r["planned_error_free_mm"] for r in rows() if r["method"] == m] for m in ("contact", "none")}
-    (pair,) = [p for p in paired(rows()) if (p.place.method, p.reference) == ("contact", "none")]
-    expected = ttest_rel(errors["contact"], errors["none"]).confidence_interval(0.95)
-    assert pair.free_mm == pytest.approx(np.mean(errors["contact"]) - np.mean(errors["none"]))
+    errors = {m: [r["planned_error_free_mm"] for r in rows() if r["method"] == m] for m in ("contact", "uncorrected")}
+    (pair,) = [p for p in paired(rows()) if (p.place.method, p.reference) == ("contact", "uncorrected")]
+    expected = ttest_rel(errors["contact"], errors["uncorrected"]).confidence_interval(0.95)
+    assert pair.free_mm == pytest.approx(np.mean(errors["contact"]) - np.mean(errors["uncorrected"]))
     assert pair.free_interval == pytest.approx((expected.low, expected.high))
 
 
@@ -174,16 +179,20 @@ def test_only_seeds_that_both_have_are_pairs() -> None:
 
 def test_none_is_the_reference_whatever_relations_were_told() -> None:
     """The paper's way with the same wrong relations, `none` with the right ones, which it does not ask for."""
-    given = [row("none", success=False), row("paper", relations="false"), row("contact", relations="false")]
+    given = [
+        row("uncorrected", success=False),
+        row("paper", contact_source="false-positive"),
+        row("contact", contact_source="false-positive"),
+    ]
     found = paired([*given, row("paper"), row("contact", 0, False)])
-    assert [(p.place.relations, p.place.method, p.reference, p.difference) for p in found] == [
-        ("given", "none", "paper", -1.0),
+    assert [(p.place.contact_source, p.place.method, p.reference, p.difference) for p in found] == [
+        ("given", "uncorrected", "paper", -1.0),
         ("given", "contact", "paper", -1.0),
-        ("given", "contact", "none", 0.0),
-        ("given", "paper", "none", 1.0),
+        ("given", "contact", "uncorrected", 0.0),
+        ("given", "paper", "uncorrected", 1.0),
         ("false", "contact", "paper", 0.0),
-        ("false", "contact", "none", 1.0),
-        ("false", "paper", "none", 1.0),
+        ("false", "contact", "uncorrected", 1.0),
+        ("false", "paper", "uncorrected", 1.0),
     ]
 
 

@@ -20,47 +20,47 @@ from apo_bench.benchmark.report.figures.style import OWN_STYLES, STYLES
 from apo_bench.benchmark.report.report import report
 from apo_bench.benchmark.report.tables.cells import cell_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
-from apo_bench.records import ROW
+from apo_bench.records import RECORD_SCHEMA
 from tests import pages
 
 UNKNOWN = dict.fromkeys(
     (
-        *("chi_square", "chi_square_freedom", "p_value", "test_passes", "suspects", "dropped", "wrong_relation"),
+        *("chi_square", "chi_square_dof", "p_value", "test_passes", "suspects", "dropped", "wrong_contact"),
         *("inside_95", "planned_error_fixed_mm", "planned_error_free_mm"),
     )
 )
 """What a row says where nothing was corrected or planned."""
-UNCOUNTED = dict.fromkeys(("contacts_right", "contacts_missed", "contacts_false"))
+UNCOUNTED = dict.fromkeys(("contacts_true_positive", "contacts_false_negative", "contacts_false_positive"))
 """What a row says of a method that is told no contacts."""
 
 
-def row(method: str = "none", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
+def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
     """What statistics looks at in a row."""
     failed = success is False
     return {
-        "schema": ROW,
+        "schema": RECORD_SCHEMA,
         "env_id": "APOReplay-v0",
-        "spec_hash": "0123456789abcdef",
+        "config_hash": "0123456789abcdef",
         "scenario": "stick_in_tower",
         "clearance_mm": 0.25,
-        "careless": 0.0 if method == "oracle" else 1.0,
-        "level": 0.0 if method == "oracle" else 1.0,
-        "level_deg": 0.0 if method == "oracle" else 1.0,
+        "human_error_scale": 0.0 if method == "oracle" else 1.0,
+        "noise_level": 0.0 if method == "oracle" else 1.0,
+        "noise_deg": 0.0 if method == "oracle" else 1.0,
         "noise": "isotropic",
-        "relations": "given",
+        "contact_source": "given",
         "grasp": "friction",
         "fidelity": "full",
         "arm": "six_axis",
-        "eye": "noise",
+        "pose_source": "noise-model",
         "timestep_s": 0.001,
         "method": method,
-        "looks": 0,
+        "max_reobservations": 0,
         "robot_error": "none",
-        "wrench": "external",
-        "stated_error": "drawn",
-        "abstain": 0.0,
+        "ft_sensor": "wrist",
+        "assumed_robot_error": "matched",
+        "min_predicted_success": 0.0,
         "seed": seed,
-        "salt": None,
+        "secret_seed": None,
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",
         "success": success,
@@ -69,10 +69,10 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "failure_stage": "attach" if failed else None,
         "failure_code": "force_stop" if failed else None,
         "failure_operation": 3 if failed else None,
-        "predicted": None if success is None else foretold(failed),
+        "failure_prediction": None if success is None else foretold(failed),
         "extra_operations": None if success is None else 0,
-        "sim_seconds": None if success is None else 20.0,
-        "pushed_mm": None if success is None else 0.1,
+        "sim_time_s": None if success is None else 20.0,
+        "displaced_mm": None if success is None else 0.1,
     } | more
 
 
@@ -123,7 +123,7 @@ def test_rows_are_counted_into_cells() -> None:
         row(seed=3, success=None),
         row(seed=4, success=False, failure_stage="judge", failure_code="gap"),
         row("oracle", seed=0),
-        row(seed=0, level=None, level_deg=None, careless=None),
+        row(seed=0, noise_mm=None, noise_deg=None, human_error_scale=None),
     ]
     ceiling, raw = tally(rows)
     assert (ceiling.method, ceiling.trials, ceiling.rate) == ("oracle", 1, 1.0)
@@ -134,9 +134,9 @@ def test_rows_are_counted_into_cells() -> None:
 
 
 def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
-    given = ("snap", "paper-track", "contact", "paper", "none", "oracle")
+    given = ("snap", "paper-track", "contact", "paper", "uncorrected", "oracle")
     assert [c.method for c in tally([row(method) for method in given])] == [
-        *("oracle", "none", "contact", "paper", "paper-track", "snap")
+        *("oracle", "uncorrected", "contact", "paper", "paper-track", "snap")
     ]
 
 
@@ -152,10 +152,10 @@ def test_predictions_are_counted_against_physics() -> None:
         row(seed=7, success=None),
         row(seed=8, success=False, failure_stage="promise", failure_code="abstained", predicted=foretold(False)),
         row("oracle", seed=0),
-        row(seed=0, scenario="stick_on_castles", level=None, level_deg=None, careless=None),
+        row(seed=0, scenario="stick_on_castles", noise_mm=None, noise_deg=None, human_error_scale=None),
     ]
     ceiling, raw, measured, everything = confusions(rows)
-    assert list(raw.values()) == ["stick_in_tower", "none", 6, 4, 1, 1, 1, 3, 4 / 6, 1, 2, 2, 1]
+    assert list(raw.values()) == ["stick_in_tower", "uncorrected", 6, 4, 1, 1, 1, 3, 4 / 6, 1, 2, 2, 1]
     assert (ceiling["method"], ceiling["agreement"], measured["scenario"]) == ("oracle", 1.0, "stick_on_castles")
     assert (everything["scenario"], everything["method"], everything["executed"]) == ("all", "all", 8)
     assert everything["agreement"] == 6 / 8
@@ -171,7 +171,7 @@ def test_predictions_are_counted_against_physics() -> None:
 )
 def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | None, bool, bool]]) -> None:
     rows = [
-        row("paper" if i % 2 else "none", seed=i, success=s, predicted=foretold(fails) if s or said else None)
+        row("paper" if i % 2 else "uncorrected", seed=i, success=s, predicted=foretold(fails) if s or said else None)
         for i, (s, fails, said) in enumerate(results)
     ]
     *parts, everything = confusions(rows)
@@ -183,7 +183,7 @@ def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | N
 @settings(max_examples=30, deadline=None)
 @given(results=st.lists(st.sampled_from([True, False, None]), max_size=30), order=st.randoms())
 def test_every_row_is_counted_once_in_any_order(results: list[bool | None], order: Any) -> None:
-    rows = [row("paper" if i % 2 else "none", seed=i, success=s) for i, s in enumerate(results)]
+    rows = [row("paper" if i % 2 else "uncorrected", seed=i, success=s) for i, s in enumerate(results)]
     shuffled = list(rows)
     order.shuffle(shuffled)
     cells = tally(rows)
@@ -196,16 +196,26 @@ def test_every_row_is_counted_once_in_any_order(results: list[bool | None], orde
 def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     rows = [row("oracle", seed=i) for i in range(4)]
     for level in (0.0, 0.5, 1.0):
-        rows += [row(seed=i, success=i < 1, level=level, level_deg=level) for i in range(4)]
-        rows += [row("paper", seed=i, success=None if i == 3 else True, level=level, level_deg=level) for i in range(4)]
+        rows += [row(seed=i, success=i < 1, noise_mm=level, noise_deg=level) for i in range(4)]
+        rows += [row("paper", seed=i, success=None if i == 3 else True, noise_mm=level, noise_deg=level) for i in range(4)]
     made = report(write(tmp_path / "run", rows))
     table = list(csv.DictReader(made.tables["cells"].open()))
     assert list(table[0])[:9] == [
-        *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method")
+        *(
+            "scenario",
+            "clearance_mm",
+            "noise",
+            "contact_source",
+            "human_error_scale",
+            "noise_mm",
+            "noise_deg",
+            "tightness",
+            "method",
+        )
     ]
-    assert [(line["method"], line["level_mm"], line["trials"], line["successes"]) for line in table] == [
+    assert [(line["method"], line["noise_mm"], line["trials"], line["successes"]) for line in table] == [
         ("oracle", "0.0", "4", "4"),
-        *(("none", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
+        *(("uncorrected", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
     assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
@@ -218,17 +228,17 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     assert "| stick_in_tower | none | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
     assert "| all | all | 25 | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
     confusion = list(csv.DictReader(made.tables["confusion"].open()))
-    assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
+    assert [line["method"] for line in confusion] == ["oracle", "uncorrected", "paper", "all"]
     assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
 
 
 def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
     """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
-    levels = ({"level": x, "level_deg": x} for x in (0.0, 0.5, 2.0))
-    rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("none", "paper")]
-    rows += [row("paper", clearance_mm=c, relations="missed") for c in (0.25, 1.0)]
+    levels = ({"noise_level": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
+    rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("uncorrected", "paper")]
+    rows += [row("paper", clearance_mm=c, contact_source="false-negative") for c in (0.25, 1.0)]
     cells = tally(rows)
-    assert {(c.clearance_mm, c.level, c.tightness) for c in cells if c.method == "none"} == {
+    assert {(c.clearance_mm, c.noise_mm, c.tightness) for c in cells if c.method == "uncorrected"} == {
         *((0.25, 0.0, None), (1.0, 0.0, None), (0.25, 0.5, 0.5), (0.25, 2.0, 0.125), (1.0, 0.5, 2.0), (1.0, 2.0, 0.5))
     }
     made = report(write(tmp_path / "run", rows))
@@ -243,14 +253,18 @@ def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
 def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: Path) -> None:
     """A reference that cannot look is that of every number of looks."""
     rows = [row("contact", seed=i, success=i < 1) for i in range(4)]
-    rows += [row("contact-robust", seed=i, success=i < n, looks=n) for n in (0, 2, 4) for i in range(4)]
+    rows += [row("contact-robust", seed=i, success=i < n, max_reobservations=n) for n in (0, 2, 4) for i in range(4)]
     found = summary(rows, ("contact",))
-    assert [(c.method, c.looks, c.successes) for c in found.cells] == [
+    assert [(c.method, c.max_reobservations, c.successes) for c in found.cells] == [
         *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
     ]
-    assert [(p.place.looks, p.only_method, p.only_reference) for p in found.pairs] == [(0, 0, 1), (2, 1, 0), (4, 3, 0)]
+    assert [(p.place.max_reobservations, p.only_method, p.only_reference) for p in found.pairs] == [
+        (0, 0, 1),
+        (2, 1, 0),
+        (4, 3, 0),
+    ]
     grouped = members(settings_of_cells(found.cells), found.cells)
-    assert [(s.looks, [c.method for c in own]) for s, own in grouped.items()] == [
+    assert [(s.max_reobservations, [c.method for c in own]) for s, own in grouped.items()] == [
         (n, ["contact", "contact-robust"]) for n in (0, 2, 4)
     ]
     made = report(write(tmp_path / "run", rows))
@@ -258,8 +272,8 @@ def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: P
     assert "figure: Success over the number of looks" in made.page.read_text(encoding="utf-8")
     assert made.answer.startswith("`contact-robust` with 4 more looks succeeds in 4 of 4 trials (100.0 %)")
     assert "`contact` succeeds in 1 of the same 4." in made.answer
-    one = report(write(tmp_path / "one", [row("contact-robust", looks=2), row("contact")]))
-    assert not any("looks" in path.name for path in one.figures)
+    one = report(write(tmp_path / "one", [row("contact-robust", max_reobservations=2), row("contact")]))
+    assert not any("max_reobservations" in path.name for path in one.figures)
 
 
 def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
@@ -285,10 +299,10 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
 def test_effort_counts_what_was_right() -> None:
     rows = [
         row("paper", 0),
-        row("paper-track", 0, extra_operations=2, sim_seconds=26.0, pushed_mm=0.3),
-        row("paper-track", 1, extra_operations=4, sim_seconds=28.0, pushed_mm=0.2),
-        row("paper-track", 2, success=False, extra_operations=9, sim_seconds=99.0, pushed_mm=9.0),
-        row("none", 0, success=False),
+        row("paper-track", 0, extra_operations=2, sim_time_s=26.0, displaced_mm=0.3),
+        row("paper-track", 1, extra_operations=4, sim_time_s=28.0, displaced_mm=0.2),
+        row("paper-track", 2, success=False, extra_operations=9, sim_time_s=99.0, displaced_mm=9.0),
+        row("uncorrected", 0, success=False),
     ]
     assert [list(line.values()) for line in efforts(rows)] == [
         ["stick_in_tower", "paper", 1, 0.0, 20.0, 0.1],
@@ -302,7 +316,7 @@ def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() 
     rows = [row("oracle"), row("oracle", 1), row("oracle", success=False, robot_error=wrong)]
     right, other = tally(rows)
     assert [(cell.robot_error, cell.trials, cell.successes) for cell in (right, other)] == [
-        ("none", 2, 2),
+        ("uncorrected", 2, 2),
         (wrong, 1, 0),
     ]
     both, alone = ("\n".join(cell_table(cells).markdown()) for cells in ((right, other), (right,)))

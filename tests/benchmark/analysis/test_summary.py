@@ -14,14 +14,14 @@ from apo_bench import InputError
 from apo_bench.benchmark.analysis import summary
 from tests.benchmark.analysis.test_rates import row
 
-METHODS = ("none", "paper", "contact")
+METHODS = ("uncorrected", "paper", "contact")
 
 
 def rows(seeds: int = 12, scenarios: int = 1) -> list[dict[str, Any]]:
     """Success that falls with the level, seeds with luck of their own."""
     luck = np.random.default_rng(7).random(seeds)
     return [
-        row(m, s, bool(luck[s] < 1 / (1 + (x / h) ** 3)), scenario=f"scenario{i}", level=x, level_deg=x)
+        row(m, s, bool(luck[s] < 1 / (1 + (x / h) ** 3)), scenario=f"scenario{i}", noise_mm=x, noise_deg=x)
         for i in range(scenarios)
         for m, h in zip(METHODS, (0.2, 1.5, 3.0), strict=True)
         for x in (0.0, 0.25, 1.0, 4.0)
@@ -33,10 +33,10 @@ def test_it_holds_every_part() -> None:
     found = summary(rows(40))
     assert len(found.cells) == 12
     assert {(p.place.method, p.reference) for p in found.pairs} == {
-        ("none", "paper"), ("paper", "none"), ("contact", "none"), ("contact", "paper")
+        ("uncorrected", "paper"), ("paper", "uncorrected"), ("contact", "uncorrected"), ("contact", "paper")
     }  # fmt: skip
-    assert [h.place.method for h in found.half_levels] == ["none", "contact", "paper"]
-    levels = [h.level or np.nan for h in found.half_levels]
+    assert [h.place.method for h in found.half_levels] == ["uncorrected", "contact", "paper"]
+    levels = [h.noise_level or np.nan for h in found.half_levels]
     assert levels == pytest.approx([0.2, 3.0, 1.5], rel=0.6) or found.half_levels[0].beyond == "below"
 
 

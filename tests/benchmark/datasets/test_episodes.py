@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
-from apo_bench import InputError, TrialSettings, load_scenario, run_trial
+from apo_bench import InputError, TrialConfig, load_scenario, run_trial
 from apo_bench.benchmark.datasets import making
 from apo_bench.benchmark.datasets.episodes import EPISODES, FRAMES, replays
 from apo_bench.benchmark.datasets.making import make_dataset
@@ -39,10 +39,10 @@ def test_an_episode_is_a_trial(made: Path) -> None:
         ("dovetail", 1000000),
     ]
     clearance_mm = load_scenario("dovetail").clearance_mm
-    row = run_trial(TrialSettings("dovetail", seed=1000000, level_mm=1.0, level_deg=1.0, clearance_mm=clearance_mm))
+    row = run_trial(TrialConfig("dovetail", seed=1000000, noise_mm=1.0, noise_deg=1.0, clearance_mm=clearance_mm))
     one = episodes[1]
-    assert {name: one[name] for name in ("spec_hash", "success", "sentence", "method", "sim_seconds")} == {
-        name: row[name] for name in ("spec_hash", "success", "sentence", "method", "sim_seconds")
+    assert {name: one[name] for name in ("config_hash", "success", "sentence", "method", "sim_time_s")} == {
+        name: row[name] for name in ("config_hash", "success", "sentence", "method", "sim_time_s")
     }
     goals = [pose.unpack(np.reshape(one[f"{name}_goals"], (-1, 7))) for name in ("seen", "true", "planned")]
     errors = [np.linalg.norm((T - goals[1])[:, :3, 3]) for T in goals]
@@ -86,7 +86,9 @@ def test_the_card_says_what_every_column_is(made: Path) -> None:
 
 
 def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_frames(tmp_path: Path) -> None:
-    trials = [TrialSettings("block_on_block", method=method, level_mm=40, level_deg=40) for method in ("none", "paper")]
+    trials = [
+        TrialConfig("block_on_block", method=method, noise_mm=40, noise_deg=40) for method in ("uncorrected", "paper")
+    ]
     said: list[str] = []
     for name in ("a", "b"):
         make_dataset(trials, tmp_path / name, "by hand", say=said.append)
@@ -126,14 +128,14 @@ def test_what_is_wrong_is_said(
 
 
 def test_tables_of_any_trials_can_be_joined(made: Path, tmp_path: Path) -> None:
-    failed = TrialSettings("stick_in_tower", method="none", level_mm=4.0, level_deg=4.0, seed=1)
+    failed = TrialConfig("stick_in_tower", method="uncorrected", noise_mm=4.0, noise_deg=4.0, seed=1)
     assert make_dataset([failed], tmp_path / "failed", "by hand") == (1, 0)
     schemas = [parquet.read_schema(folder / "episodes.parquet") for folder in (made, tmp_path / "failed")]
     assert schemas[0].equals(schemas[1])
 
 
 def test_what_makes_no_episode_leaves_nothing_behind(tmp_path: Path) -> None:
-    failed = TrialSettings("stick_in_tower", method="none", level_mm=4.0, level_deg=4.0, seed=1)
+    failed = TrialConfig("stick_in_tower", method="uncorrected", noise_mm=4.0, noise_deg=4.0, seed=1)
     (tmp_path / "here").mkdir()
     for form in ("lerobot", "minari"):
         for out in (tmp_path / "here", tmp_path / "new"):
@@ -146,7 +148,7 @@ def test_what_makes_no_episode_leaves_nothing_behind(tmp_path: Path) -> None:
 def test_a_policy_that_raises_is_named_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "raising.py").write_text("def act(env, seen):\n    return 1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    trials = [TrialSettings("block_on_block", method="contact", seed=1)]
+    trials = [TrialConfig("block_on_block", method="contact", seed=1)]
     with pytest.raises(InputError, match=r"raised ZeroDivisionError: division by zero \(.*raising.py, line 2\)"):
         make_dataset(trials, tmp_path / "out", "by hand", "lerobot", "raising:act")
     assert not (tmp_path / "out").exists()
@@ -158,7 +160,7 @@ def test_an_interrupt_keeps_the_episodes_that_had_ended(tmp_path: Path, monkeypa
         raise KeyboardInterrupt
 
     monkeypatch.setattr(making, "replays", interrupted)
-    trials = [TrialSettings("block_on_block", method="contact", seed=k) for k in range(3)]
+    trials = [TrialConfig("block_on_block", method="contact", seed=k) for k in range(3)]
     said: list[str] = []
     with pytest.raises(KeyboardInterrupt):
         make_dataset(trials, tmp_path / "out", "by hand", "lerobot", say=said.append)
@@ -205,7 +207,7 @@ def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monk
 def test_a_full_disk_is_one_sentence_and_the_data_set_says_that_it_is_not_finished(form: str, tmp_path: Path) -> None:
     program = f"""
 import resource
-from apo_bench import TrialSettings
+from apo_bench import TrialConfig
 from apo_bench.benchmark.datasets import making
 from apo_bench.benchmark.datasets.episodes import replays
 
@@ -215,7 +217,7 @@ def limited(trials, scenes):
     return iter(found)
 
 making.replays = limited
-trials = [TrialSettings("block_on_block", method="none", level_mm=0.0, level_deg=0.0)]
+trials = [TrialConfig("block_on_block", method="uncorrected", level_mm=0.0, level_deg=0.0)]
 try:
     making.make_dataset(trials, making.Path("out"), "by hand", {form!r})
 except making.InputError as error:

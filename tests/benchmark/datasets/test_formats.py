@@ -13,14 +13,14 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from pyarrow import parquet
 
-from apo_bench import InputError, TrialSettings
+from apo_bench import InputError, TrialConfig
 from apo_bench.benchmark.datasets.making import make_dataset
 from apo_bench.benchmark.datasets.minari import write_minari
 
 REPLAYED = [
-    TrialSettings(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
+    TrialConfig(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
 ]
-INSERTED = [TrialSettings("block_on_block", method="contact", seed=1000000 + k) for k in range(2)]
+INSERTED = [TrialConfig("block_on_block", method="contact", seed=1000000 + k) for k in range(2)]
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_the_card_names_every_field_and_croissant_every_file(lerobot: dict[str, 
 
 
 def test_trials_in_which_nothing_moves_are_left_out_and_said(tmp_path: Path) -> None:
-    trials = [TrialSettings("block_on_block", method="paper", level_mm=40, level_deg=40, seed=k) for k in range(3)]
+    trials = [TrialConfig("block_on_block", method="paper", noise_mm=40, noise_deg=40, seed=k) for k in range(3)]
     said: list[str] = []
     made, _ = make_dataset(trials, tmp_path / "data", "by hand", "lerobot", say=said.append)
     assert made + len(said) == 3
@@ -188,7 +188,7 @@ def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(
 
 
 def test_without_pyarrow_a_minari_data_set_is_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    trials = [TrialSettings("block_on_block", fidelity="contact", seed=1)]
+    trials = [TrialConfig("block_on_block", fidelity="near-contact", seed=1)]
     make_dataset(trials, tmp_path / "with", "by hand", "minari")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     make_dataset(trials, tmp_path / "without", "by hand", "minari")

@@ -16,9 +16,9 @@ from apo_bench.benchmark.datasets.drawing import by_part, observe_many
 from apo_bench.benchmark.scoring.track import read_tracks
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.symmetric import AnyTurn
-from apo_bench.perception.observation.noise import NOISES, Level, make_noise
+from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
-from apo_bench.scenario import careless_covariance, scenario_names, spread_error
+from apo_bench.scenario import human_error_covariance, scenario_names, spread_error
 from apo_bench.scenario.layouts import draw_layouts
 from apo_bench.trial.stages import stream
 
@@ -29,7 +29,7 @@ KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurn]
 
 
 def test_models_whose_parts_are_independent_are_drawn_together() -> None:
-    assert {name for name in (*NOISES, *presets()) if not by_part(make_noise(name, Level(1.0, 1.0)))} == SHARED
+    assert {name for name in (*NOISES, *presets()) if not by_part(make_noise(name, NoiseLevel(1.0, 1.0)))} == SHARED
     assert not pairs("stick_in_tower", "swaps", 3).together
     assert pairs("stick_in_tower", "bias", 3).together
 
@@ -38,14 +38,14 @@ def test_models_whose_parts_are_independent_are_drawn_together() -> None:
 def test_one_demonstration_is_seen_as_the_noise_model_sees_it(noise: str | type) -> None:
     """Bit for bit: it is the noise model itself that is asked, whether for one or for many."""
     scenario = load_scenario("carried_bridge")
-    model = make_noise(noise, Level(2.0, 1.0))
+    model = make_noise(noise, NoiseLevel(2.0, 1.0))
     layouts = draw_layouts(scenario, np.random.default_rng(1), 1)
-    careless = careless_covariance(scenario, 1.0)
-    many = observe_many(scenario.assembly, layouts, careless, model, np.random.default_rng(2))
+    human_error_scale = human_error_covariance(scenario, 1.0)
+    many = observe_many(scenario.assembly, layouts, human_error_scale, model, np.random.default_rng(2))
     start = {part: poses[0] for part, poses in layouts.start.items()}
     one = model(
         scenario.assembly,
-        Demonstration(scenario.assembly, start, layouts.goals[0], {}, careless),
+        Demonstration(scenario.assembly, start, layouts.goals[0], {}, human_error_scale),
         np.random.default_rng(2),
     )
     assert many.goals[0].tobytes() == one.goals.tobytes()
@@ -58,7 +58,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
     """Quartiles of shifts and turns, how often nothing is seen, and how alike two errors of one part are."""
 
     def drawn() -> np.ndarray:
-        many = pairs("carried_bridge", noise, 256, 4, level=2.0, careless=0.0)
+        many = pairs("carried_bridge", noise, 256, 4, noise_level=2.0, human_error_scale=0.0)
         xi = pose.log(pose.inverse(many.truth) @ many.goals)
         sizes = np.linalg.norm(xi.reshape(256, -1, 2, 3), axis=-1)
         quartiles = np.quantile(sizes[many.seen], [0.25, 0.5, 0.75], axis=0)
@@ -88,22 +88,22 @@ def test_every_contact_of_the_truth_holds(name: str) -> None:
 def test_a_mistake_spreads_in_each_layout_as_in_a_demonstration(name: str) -> None:
     """Without noise what is shown is seen, and its mistake is that of a trial of the same size."""
     scenario = load_scenario(name)
-    assert scenario.careless is not None
-    careful, careless = (pairs(name, n=2, level=0.0, careless=c) for c in (0.0, 1.0))
+    assert scenario.human_error is not None
+    careful, human_error_scale = (pairs(name, n=2, noise_level=0.0, human_error_scale=c) for c in (0.0, 1.0))
     np.testing.assert_array_equal(careful.goals, careful.truth)
     layouts = draw_layouts(scenario, drawing.stream(0, name, 0), 2)
     for i in range(2):
-        off = (pose.inverse(careless.truth[i]) @ careless.goals[i])[:, :3, 3]
-        mine = off[scenario.careless.operation]
-        layout = Layout(careless.truth[i], {part: poses[i] for part, poses in layouts.start.items()})
+        off = (pose.inverse(human_error_scale.truth[i]) @ human_error_scale.goals[i])[:, :3, 3]
+        mine = off[scenario.human_error.operation]
+        layout = Layout(human_error_scale.truth[i], {part: poses[i] for part, poses in layouts.start.items()})
         np.testing.assert_allclose(off, spread_error(scenario, layout, mine).offsets, atol=1e-12)
-        assert scenario.careless.low_m <= np.linalg.norm(mine) + 1e-12 <= scenario.careless.high_m + 2e-12
+        assert scenario.human_error.low_m <= np.linalg.norm(mine) + 1e-12 <= scenario.human_error.high_m + 2e-12
 
 
 def test_more_pairs_begin_with_the_same_ones() -> None:
-    few = pairs("dovetail", "outliers", 5, 7, level=(1.0, 2.0))
-    many = pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, level=(1.0, 2.0))
-    blocks = endless_pairs("dovetail", "outliers", 7, level=(1.0, 2.0))
+    few = pairs("dovetail", "outliers", 5, 7, noise_level=(1.0, 2.0))
+    many = pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, noise_level=(1.0, 2.0))
+    blocks = endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
     first, second = next(blocks), next(blocks)
     for name in ("goals", "covariance", "seen", "truth"):
         np.testing.assert_array_equal(getattr(many, name)[:5], getattr(few, name))
@@ -176,7 +176,7 @@ def test_neither_simulator_nor_torch_is_loaded() -> None:
         ({"scenarios": "dovetial"}, "unknown scenario 'dovetial'"),
         ({"scenarios": "dovetail", "n": 0}, "0 pairs were asked for"),
         ({"scenarios": 5}, "a Path, a Scenario or a list"),
-        ({"scenarios": "dovetail", "level": -1.0}, "level"),
+        ({"scenarios": "dovetail", "noise_level": -1.0}, "noise_level"),
     ],
 )
 def test_what_is_wrong_is_said(given: dict[str, object], complaint: str) -> None:

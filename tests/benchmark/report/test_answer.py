@@ -14,7 +14,7 @@ from apo_bench.benchmark.analysis import FEWEST_SEEDS, Results, contrast, summar
 from apo_bench.benchmark.report.answer import ALIKE_WITHIN, answer
 from tests.benchmark.analysis.test_rates import row
 
-METHODS = ("contact", "none", "paper", "snap")
+METHODS = ("contact", "uncorrected", "paper", "snap")
 COUNT = re.compile(r"`([^`]+)`(?: with \d more looks?)? (?:succeeds )?in ([\d,]+) of (?:the same )?([\d,]+)")
 
 
@@ -23,11 +23,11 @@ def said(rows: list[dict[str, Any]]) -> str:
 
 
 def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[str, Any]]:
-    return [row(method, seed, success, level=x, level_deg=x) for x, success in enumerate(successes, start=1)]
+    return [row(method, seed, success, noise_mm=x, noise_deg=x) for x, success in enumerate(successes, start=1)]
 
 
 def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
-    rows = [row("contact", i, i > 0) for i in range(20)] + [row("none", i, i > 11) for i in range(20)]
+    rows = [row("contact", i, i > 0) for i in range(20)] + [row("uncorrected", i, i > 11) for i in range(20)]
     low, high = wilson(19, 20)
     least, most = tango(11, 0, 20)
     assert said(rows) == (
@@ -40,7 +40,7 @@ def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
 def test_all_against_nothing_with_few_seeds_is_counted_and_nothing_more() -> None:
     """The first sweep of a new user: 24 of 24 against 0 of 24 is not `as often`, and 4 seeds have no interval."""
     rows = [r for i in range(4) for r in at_levels("contact", i, (True,) * 6)]
-    rows += [r for i in range(4) for r in at_levels("none", i, (False,) * 6)]
+    rows += [r for i in range(4) for r in at_levels("uncorrected", i, (False,) * 6)]
     assert said(rows) == (
         "`contact` succeeds in 24 of 24 trials (100.0 %). `none` succeeds in 0 of the same 24. 4 seeds are too few for "
         "an interval: from 6 on, a difference at every seed is beyond chance."
@@ -49,35 +49,35 @@ def test_all_against_nothing_with_few_seeds_is_counted_and_nothing_more() -> Non
 
 def test_equal_counts_are_as_often_only_where_the_interval_is_narrow() -> None:
     for seeds, words in ((30, "as many, but 30 seeds leave room for a difference"), (200, "as often, to within 1.9")):
-        rows = [row(m, i) for m in ("contact", "none") for i in range(seeds)]
+        rows = [row(m, i) for m in ("contact", "uncorrected") for i in range(seeds)]
         assert f"`contact` succeeds in {seeds} of the same {seeds}: {words}" in said(rows)
 
 
 def test_a_difference_that_is_not_beyond_chance_is_told_so() -> None:
-    rows = [row("contact", i) for i in range(20)] + [row("none", i, i > 1) for i in range(20)]
+    rows = [row("contact", i) for i in range(20)] + [row("uncorrected", i, i > 1) for i in range(20)]
     assert "`contact` is 10.0 points ahead, which 20 seeds do not tell from chance (95 % interval -" in said(rows)
 
 
 def test_an_interval_off_zero_is_no_proof_where_few_seeds_differ() -> None:
     """Tango's leaves out 0 at 4 of 10 against 0 of 10, McNemar's exact p is 0.125."""
-    rows = [row("contact", i, i < 4) for i in range(10)] + [row("none", i, False) for i in range(10)]
+    rows = [row("contact", i, i < 4) for i in range(10)] + [row("uncorrected", i, False) for i in range(10)]
     assert tango(4, 0, 10).low > 0
     assert "is 40.0 points ahead, which 10 seeds do not tell from chance" in said(rows)
 
 
 def test_pairs_that_are_missing_are_not_counted() -> None:
-    rows = [row("contact", i) for i in range(20)] + [row("none", i, False) for i in range(8)]
+    rows = [row("contact", i) for i in range(20)] + [row("uncorrected", i, False) for i in range(8)]
     assert "Of the 8 trials that both have, `none` succeeds in 0 and `contact` in 8: " in said(rows)
 
 
 def test_where_no_method_succeeds_it_says_so() -> None:
-    rows = [row(m, i, False) for m in ("contact", "none") for i in range(8)]
+    rows = [row(m, i, False) for m in ("contact", "uncorrected") for i in range(8)]
     assert said(rows) == "No method succeeds in any trial: `none` in 0 of 8, `contact` in 0 of 8."
 
 
 def test_it_says_where_the_curve_falls_to_one_half() -> None:
     rows = [
-        row(m, i, x < 2.0, level=x, level_deg=x)
+        row(m, i, x < 2.0, noise_mm=x, noise_deg=x)
         for x in (0.5, 1.0, 2.0, 4.0)
         for m in ("contact", "paper")
         for i in range(30)
@@ -95,13 +95,13 @@ def test_it_says_where_the_curve_falls_to_one_half() -> None:
     ],
 )
 def test_levels_that_do_not_reach_one_half_say_so(h: float, words: str) -> None:
-    rows = [row("contact", i, x < h or i == 0, level=x, level_deg=x) for x in (1.0, 4.0) for i in range(9)]
+    rows = [row("contact", i, x < h or i == 0, noise_mm=x, noise_deg=x) for x in (1.0, 4.0) for i in range(9)]
     assert words in said(rows)
 
 
 def test_of_several_settings_the_worst_curve_is_told() -> None:
     def at(scenario: str, h: float) -> list[dict[str, Any]]:
-        return [row("contact", i, x < h, level=x, level_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
+        return [row("contact", i, x < h, noise_mm=x, noise_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
 
     assert "In each of 2 settings its curve over the level stays above one half up" in said(at("a", 9.0) + at("b", 9.0))
     worst = "In the worst of 2 settings its curve over the level falls to one half at level 2 (surely: 1 to 4)."
@@ -109,7 +109,9 @@ def test_of_several_settings_the_worst_curve_is_told() -> None:
 
 
 def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
-    rows = [row("contact", i) for i in range(5)] + [row("contact", i, False, relations="missed") for i in range(5)]
+    rows = [row("contact", i) for i in range(5)] + [
+        row("contact", i, False, contact_source="false-negative") for i in range(5)
+    ]
     assert said(rows).startswith("`contact` succeeds in 5 of 5 trials")
     assert "in 0 of 5" in said(rows[5:])
     assert said(rows[5:]).endswith("Correctors were told relations `missed` here, not `given`.")
@@ -142,7 +144,7 @@ def tables(draw: st.DrawFn) -> list[dict[str, Any]]:
             for level in range(1, levels + 1):
                 success = None if seed in excluded else luck.random() < rate
                 if luck.random() < kept:
-                    made.append(row(method, seed, success, level=float(level), level_deg=float(level)))
+                    made.append(row(method, seed, success, noise_mm=float(level), noise_deg=float(level)))
     return made
 
 
@@ -152,7 +154,7 @@ def test_no_sentence_contradicts_the_counts(rows: list[dict[str, Any]]) -> None:
     results: dict[str, dict[tuple[Any, ...], bool]] = {}
     for r in rows:
         if r["success"] is not None:
-            results.setdefault(r["method"], {})[r["level"], r["seed"]] = r["success"]
+            results.setdefault(r["method"], {})[r["noise_level"], r["seed"]] = r["success"]
     words = answer(rows, ())
     if not any(any(own.values()) for own in results.values()):
         assert words.startswith("No method succeeds in any trial" if results else "No trial counts")

@@ -29,7 +29,7 @@ def first() -> list[dict[str, Any]]:
 
 def second() -> list[dict[str, Any]]:
     """The same at another fidelity: seed 1 fails, seed 0 is right, seed 2 is a little off, seed 3 was not run."""
-    made = [{**r, "fidelity": "contact"} for r in first() if r["seed"] != 3]
+    made = [{**r, "fidelity": "near-contact"} for r in first() if r["seed"] != 3]
     for r in made:
         if r["scenario"] == "stick_in_tower" and r["seed"] == 1:
             lost = {"success": False, "as_demonstrated": False, "loose_success": True}
@@ -39,7 +39,7 @@ def second() -> list[dict[str, Any]]:
             r |= won | {"failure_stage": None, "failure_code": None}
         if r["scenario"] == "stick_in_tower" and r["seed"] == 2:
             r["worst_gap_mm"] += 0.5
-    return [*made, row("contact", 77, True, fidelity="contact")]
+    return [*made, row("contact", 77, True, fidelity="near-contact")]
 
 
 @pytest.fixture
@@ -140,8 +140,10 @@ def test_the_command_writes_a_page_and_exits_with_0(
     assert "Verdicts agree in 46 of 48 (95.83 %): 1 right in the first alone, 1 in the second alone." in said
     assert "versions: mujoco, rows: fidelity" in said
     line, _ = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
-    assert line["command of the first"] == "apo-bench replay stick_in_tower --clearance 0.25 --method contact --seed 0"
-    assert line["command of the second"].endswith("--method contact --fidelity contact --seed 0")
+    assert (
+        line["command of the first"] == "apo-bench replay stick_in_tower --clearance-mm 0.25 --method contact --seed 0"
+    )
+    assert line["command of the second"].endswith("--method contact --fidelity near-contact --seed 0")
     page = pages.lines(out / "compare.html")
     assert "| stick_in_tower | 39 | 37 (94.87 %) | 83.11 to 98.58 % |" in page
     assert "| versions: mujoco | 3.17.0 | 3.18.0 |" in page

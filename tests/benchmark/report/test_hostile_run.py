@@ -31,7 +31,7 @@ NAMES = (
     {"arm": "evil:arm"},
     {"method": "evil:correct"},
     {"noise": "evil:noise"},
-    {"relations": "evil:told"},
+    {"contact_source": "evil:told"},
 )
 DANGEROUS = (
     *('<script>alert("1")</script>', "$(touch x)", "; rm -r .", "`touch x`", "'; touch x; '", "-x", "a b", "&&"),
@@ -65,7 +65,7 @@ def test_nothing_that_rows_name_is_imported(hostile: Path, capsys: pytest.Captur
 
 def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     """So the tests above would see it."""
-    made, missed = failure_pictures([failed(0, arm="evil:arm", spec_hash="0")], hostile, trust_code=True)
+    made, missed = failure_pictures([failed(0, arm="evil:arm", config_hash="0")], hostile, trust_code=True)
     assert not made
     assert "its module raised SystemExit" in missed[0]
     assert (hostile / "touched").exists()
@@ -76,7 +76,7 @@ def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     [
         ({"noise": "my noise.toml"}, ()),
         ({"noise": "flips:p=0.1/r=0.5"}, ()),
-        ({"noise": "empirical:mine.csv", "relations": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
+        ({"noise": "empirical:mine.csv", "contact_source": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
         *((names, tuple(names.values())) for names in NAMES),
     ],
 )
@@ -85,7 +85,14 @@ def test_what_is_code_of_ones_own(names: dict[str, str], own: tuple[str, ...]) -
 
 
 def dangerous(seed: int, evil: str) -> dict[str, Any]:
-    more = {"scenario": evil, "noise": evil, "arm": evil, "relations": f"x:{evil}", "method": evil, "sentence": evil}
+    more = {
+        "scenario": evil,
+        "noise": evil,
+        "arm": evil,
+        "contact_source": f"x:{evil}",
+        "method": evil,
+        "sentence": evil,
+    }
     return row(seed=seed, success=False) | more
 
 
@@ -94,7 +101,7 @@ def test_commands_are_quoted(evil: str) -> None:
     said = shlex.split(replay_command(dangerous(3, evil)))
     assert said[:2] == ["apo-bench", "replay"]
     assert said[2] == (f"./{evil}" if evil.startswith("-") else evil)
-    for option, value in (("--noise", evil), ("--arm", evil), ("--relations", f"x:{evil}"), ("--method", evil)):
+    for option, value in (("--noise", evil), ("--arm", evil), ("--contact-source", f"x:{evil}"), ("--method", evil)):
         assert said[said.index(option) + 1] == value
 
 
@@ -133,7 +140,7 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
     from apo_bench.trial.outcome_columns import result
 
     end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
-    print_row(row("contact", 0, False, eye="noise") | end)
+    print_row(row("contact", 0, False, pose_source="noise-model") | end)
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])

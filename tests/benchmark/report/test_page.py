@@ -24,7 +24,7 @@ from tests.benchmark.analysis.test_rates import row, write
 from tests.browser import browser, opened, overflow
 
 EVIL = '<script>document.title="broken"</script>"><img src=x onerror="document.title=1">'
-METHODS = ("none", "contact", "paper", "mine:<b>correct</b>")
+METHODS = ("uncorrected", "contact", "paper", "mine:<b>correct</b>")
 SEEDS = 120
 
 
@@ -35,20 +35,20 @@ def rows() -> list[dict[str, Any]]:
         for method in METHODS:
             for seed in range(SEEDS):
                 success = None if seed == 7 else (seed * 31 + len(method) * int(level)) % 5 > METHODS.index(method) % 3
-                made.append(row(method, seed, success, level=level, level_deg=level, **numbers(seed, method)))
+                made.append(row(method, seed, success, noise_mm=level, noise_deg=level, **numbers(seed, method)))
     made += [row("contact", seed, False, scenario=f"evil {EVIL}", sentence=f"why {EVIL}") for seed in range(3)]
     return made
 
 
 def numbers(seed: int, method: str) -> dict[str, Any]:
-    corrected = {} if method == "none" else {"gap_after_mm": 1e-9 * (seed + 1)}
+    corrected = {} if method == "uncorrected" else {"gap_after_mm": 1e-9 * (seed + 1)}
     return {"sentence": "said so", "gap_before_mm": 2.0 + seed / 100, "worst_gap_mm": 0.1 + seed * 1e-3, **corrected}
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = write(tmp_path_factory.mktemp("page") / "run", rows())
-    keys = ("scenario", "method", "seed", "level")
+    keys = ("scenario", "method", "seed", "noise_level")
     lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
     text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
     (folder / "timing.jsonl").write_text(text, encoding="utf-8")
@@ -118,14 +118,14 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         first = lines.nth(3).inner_text()
         assert first.startswith("3")
         assert "2.03" in first
-        want = "apo-bench replay stick_in_tower --level 2 --clearance 0.25 --method paper --seed 3"
+        want = "apo-bench replay stick_in_tower --noise-level 2 --clearance-mm 0.25 --method paper --seed 3"
         assert lines.nth(3).locator("code").inner_text() == want
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         lines.nth(3).locator("button.copy").click()
         page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
         assert page.evaluate("navigator.clipboard.readText()") == want
         page.locator(".trials input").check()
-        failed = [r for r in rows() if (r["method"], r["level"], r["success"]) == ("paper", 2.0, False)]
+        failed = [r for r in rows() if (r["method"], r["noise_level"], r["success"]) == ("paper", 2.0, False)]
         assert lines.count() == len(failed)
         page.keyboard.press("Escape")
         assert button.get_attribute("aria-expanded") == "false"
@@ -253,7 +253,9 @@ def test_the_same_rows_in_another_order_make_the_same_tables_and_commands(made: 
 
 def test_many_rows_take_little_room(tmp_path: Path) -> None:
     """A page grows by some 60 bytes a trial."""
-    many = [row(m, i, i % 3 > 0, worst_gap_mm=0.1 + i * 1.7e-5) for m in ("none", "contact") for i in range(4000)]
+    many = [
+        row(m, i, i % 3 > 0, worst_gap_mm=0.1 + i * 1.7e-5) for m in ("uncorrected", "contact") for i in range(4000)
+    ]
     made = report(write(tmp_path / "many", many))
     assert made.page.stat().st_size < 8000 * 60 + 200_000
     assert len(pages.trials(made.page)["columns"]["seed"]) == 8000
@@ -279,20 +281,24 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
     [
         [row("contact", i, None) for i in range(3)],
         [row("oracle", i) for i in range(3)],
-        [row("none", 0), row("contact", 0, relations="missed"), row("contact", 0, grasp="weld", fidelity="contact")],
-        [row("contact", 0, level=x, level_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
+        [
+            row("uncorrected", 0),
+            row("contact", 0, contact_source="false-negative"),
+            row("contact", 0, grasp="weld", fidelity="near-contact"),
+        ],
+        [row("contact", 0, noise_mm=x, noise_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
         [row(f"mine:m{k}") for k in range(20)],
-        [row("contact", 2**53 - 1), row("contact", 0, level=None, level_deg=None, careless=None)],
+        [row("contact", 2**53 - 1), row("contact", 0, noise_mm=None, noise_deg=None, human_error_scale=None)],
     ],
     ids=["excluded", "oracle", "conditions", "pairs of levels", "methods", "measured beside"],
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))
-    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["level"] is not None for r in trials)
+    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_level"] is not None for r in trials)
 
 
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
-    two = [row("none"), row("contact", gap_before_mm=1.0, gap_after_mm=0.0)]
+    two = [row("uncorrected"), row("contact", gap_before_mm=1.0, gap_after_mm=0.0)]
     folder = write(tmp_path / "run", two)
     older = set(report(folder).figures)
     newer = set(report(write(folder, two[:1])).figures)
@@ -301,7 +307,12 @@ def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
 
 
 def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path: Path) -> None:
-    lost = {"failure_stage": "worker", "failure_code": "time_limit", "failure_operation": None, "predicted": None}
+    lost = {
+        "failure_stage": "worker",
+        "failure_code": "time_limit",
+        "failure_operation": None,
+        "failure_prediction": None,
+    }
     made = report(write(tmp_path / "run", [row("contact", 0), row("contact", 1, False, **lost)]))
     page = pages.lines(made.page)
     assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.report.pictures import sample
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
@@ -19,8 +19,8 @@ from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
-SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, careless=0.0, method="none", seed=5)
-SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=1, level_mm=10.0, level_deg=1.0))
+SPEC = TrialConfig("block_on_block", noise_mm=3.0, noise_deg=2.0, human_error_scale=0.0, method="uncorrected", seed=5)
+SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=1, noise_mm=10.0, noise_deg=1.0))
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
         pytest.skip(missed[0])
     assert made[0].jpeg.startswith(b"\xff\xd8")
     assert "run again" in made[0].words
-    other = [{**r, "spec_hash": "0" * 16} for r in trials]
+    other = [{**r, "config_hash": "0" * 16} for r in trials]
     older, _ = failure_pictures(sample(other, 1), write(tmp_path / "older", other))
     assert "as the row says" in older[0].words
     assert older[0].jpeg != made[0].jpeg
@@ -82,21 +82,40 @@ def test_a_page_without_graphics_says_so(
 
 
 def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
-    usual = {"eye": "noise", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
-    said = "apo-bench replay stick_in_tower --clearance 0.25 --method none --seed 3"
-    assert replay_command(row("none", 3, **usual)) == replay_command(row("none", 3)) == said
+    usual = {"pose_source": "noise-model", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
+    said = "apo-bench replay stick_in_tower --clearance-mm 0.25 --method uncorrected --seed 3"
+    assert replay_command(row("uncorrected", 3, **usual)) == replay_command(row("uncorrected", 3)) == said
     other = row(
-        "my mod:it's", 9, level=0.1, level_deg=0.3, careless=0.5, noise="a b.toml", relations="shifted:3", grasp="weld",
-        clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "contact", "arm": "mine:arm"}),
+        "my mod:it's", 9, noise_mm=0.1, noise_deg=0.3, human_error_scale=0.5, noise="a b.toml", contact_source="shifted:3", grasp="weld",
+        clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "near-contact", "arm": "mine:arm"}),
     )  # fmt: skip
     assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == [
-        *("apo-bench", "replay", "my dir/tower.toml", "--level-mm", "0.1", "--level-deg", "0.3", "--careless", "0.5"),
-        *("--clearance", "0.3", "--noise", "a b.toml", "--grasp", "weld", "--arm", "mine:arm"),
-        *("--relations", "shifted:3", "--method", "my mod:it's", "--timestep-ms", "0.5", "--fidelity", "contact"),
+        *(
+            "apo-bench",
+            "replay",
+            "my dir/tower.toml",
+            "--noise-mm",
+            "0.1",
+            "--noise-deg",
+            "0.3",
+            "--human-error-scale",
+            "0.5",
+        ),
+        *("--clearance-mm", "0.3", "--noise", "a b.toml", "--grasp", "weld", "--arm", "mine:arm"),
+        *(
+            "--contact-source",
+            "shifted:3",
+            "--method",
+            "my mod:it's",
+            "--timestep-ms",
+            "0.5",
+            "--fidelity",
+            "near-contact",
+        ),
         *("--seed", "9"),
     ]
-    seen = row("contact", 1, level=0.5, level_deg=0.0, noise="range", eye="range")
-    shown = "apo-bench replay stick_in_tower --level 0.5 --clearance 0.25 --eye range --method contact --seed 1"
+    seen = row("contact", 1, noise_mm=0.5, noise_deg=0.0, noise="depth-camera", pose_source="depth-camera")
+    shown = "apo-bench replay stick_in_tower --noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
     assert replay_command(seen) == shown
 
 
@@ -108,8 +127,8 @@ def test_numbers_are_read_as_they_were(x: float) -> None:
 
 def test_the_sample_does_not_depend_on_the_order() -> None:
     failed = [
-        row(m, i, False, failure_code=code, sim_seconds=9.0)
-        for m in ("none", "paper", "contact")
+        row(m, i, False, failure_code=code, sim_time_s=9.0)
+        for m in ("uncorrected", "paper", "contact")
         for code in ("force_stop", "gap")
         for i in range(2 if code == "gap" else 5)
     ]
@@ -118,4 +137,4 @@ def test_the_sample_does_not_depend_on_the_order() -> None:
     assert [r["failure_code"] for r in chosen] == ["force_stop", "gap"]  # one for each way of failing
     assert len({r["method"] for r in chosen}) == 2
     assert sample(failed, 1) == chosen[:1]
-    assert sample([row("none", 0, False, sim_seconds=None)], 4) == []
+    assert sample([row("uncorrected", 0, False, sim_time_s=None)], 4) == []

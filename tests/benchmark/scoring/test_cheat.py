@@ -11,11 +11,11 @@ from apo_bench.benchmark.scoring.entry import read_entry
 from apo_bench.cli.app import main
 
 BRACKET = """
-scenarios = ["l_bracket_on_plate"]
-levels = [2]
-careless = [0]
+scenario = ["l_bracket_on_plate"]
+noise_level = [2]
+human_error_scale = [0]
 trials = 2
-fidelity = "contact"
+fidelity = "near-contact"
 
 [track]
 schema = "apo-bench/track/1"
@@ -36,9 +36,9 @@ def test_a_cheat_scores_no_more_than_who_knows_the_scenario_by_heart(
         assert main(command) == 0
         return read_entry(tmp_path / f"{name}.json").tracks["bracket"].score
 
-    salted = ("--salt-file", "salt")
+    salted = ("--secret-seed-file", "secret_seed")
     assert score("public", "cheat:cheat") == 100.0
-    by_heart = score("by_heart", "by-heart", *salted)
+    by_heart = score("by_heart", "nominal", *salted)
     assert by_heart < 100.0
     assert score("verified", "cheat:cheat", *salted) <= by_heart
-    assert read_entry(tmp_path / "verified.json").tracks["bracket"].salt is not None
+    assert read_entry(tmp_path / "verified.json").tracks["bracket"].secret_seed is not None

@@ -16,7 +16,7 @@ from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, read_en
 from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
 
 
-def track(overall: bool = True, salt: str | None = None, file: str = "f" * 16, **cells: str) -> TrackScore:
+def track(overall: bool = True, secret_seed: str | None = None, file: str = "f" * 16, **cells: str) -> TrackScore:
     counted = "".join(cells.values()).replace("x", "")
     value, low, high = score_of(cells)
     return TrackScore(
@@ -27,11 +27,11 @@ def track(overall: bool = True, salt: str | None = None, file: str = "f" * 16, *
         high=high,
         trials=len(counted),
         executed=len(counted),
-        promised=None,
+        predicted_success=None,
         brier=None,
         rows="0" * 16,
         code="1" * 16,
-        salt=salt,
+        secret_seed=secret_seed,
         cells=cells,
     )
 
@@ -86,7 +86,7 @@ def _of(cells: dict[str, str]) -> dict[str, object]:
         ({"brier": 0.1}, "no plan that promised anything"),
         ({"rows": "x"}, "matching regex"),
         ({"code": "0" * 16 + "\n"}, "matching regex"),
-        ({"salt": ""}, "matching regex"),
+        ({"secret_seed": ""}, "matching regex"),
         ({"overall": 1}, "Expected `bool`"),
         ({"rank": 1}, "unknown field"),
     ],
@@ -122,10 +122,10 @@ def test_who_left_tracks_out_stands_below_who_did_not() -> None:
 
 
 def test_verified_is_who_was_run_with_a_salt_of_the_organiser_in_every_track() -> None:
-    salt = "5" * 16
-    salted = entry("salted", given=track(a="1", salt=salt), tight=track(a="1", salt=salt))
-    half = entry("half", given=track(a="1", salt=salt), tight=track(a="1"))
-    told = {line.entry.name: line.status for line in ranked([salted, half], frozenset({salt}))}
+    secret_seed = "5" * 16
+    salted = entry("salted", given=track(a="1", secret_seed=secret_seed), tight=track(a="1", secret_seed=secret_seed))
+    half = entry("half", given=track(a="1", secret_seed=secret_seed), tight=track(a="1"))
+    told = {line.entry.name: line.status for line in ranked([salted, half], frozenset({secret_seed}))}
     assert told == {"salted": "verified", "half": "self-reported"}
     assert {line.status for line in ranked([salted, half])} == {"self-reported"}
 

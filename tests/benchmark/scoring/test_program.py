@@ -111,7 +111,7 @@ def requests(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return [json.loads(line) for line in out.read_text().splitlines()]
 
 
-def as_seen(request: dict[str, Any]) -> dict[str, Any]:
+def is_uncorrected(request: dict[str, Any]) -> dict[str, Any]:
     keys = ("position_mm", "quaternion_wxyz")
     return {"id": request["id"], "goals": [{key: o[key] for key in keys} for o in request["operations"]]}
 
@@ -143,7 +143,7 @@ def _one_pose_less(answers: list[Any]) -> str:
             "line 1, goal 1: an object",
         ),
         (lambda answers: lines([{"id": answers[0]["id"]}, answers[1]]), "the key 'goals' is missing"),
-        (lambda answers: lines(["none", 5]), "line 1: an object"),
+        (lambda answers: lines(["uncorrected", 5]), "line 1: an object"),
         (lambda answers: "these are no answers\n", "this is not JSON"),
         (lambda answers: lines(answers).replace("1", "NaN"), "must be finite"),
     ],
@@ -155,7 +155,7 @@ def test_answers_that_are_not_those_of_the_track_are_refused_before_a_trial_runs
     alter: Callable[[list[Any]], str],
     said: str,
 ) -> None:
-    assert score(tmp_path, alter([as_seen(request) for request in requests])) == 2
+    assert score(tmp_path, alter([is_uncorrected(request) for request in requests])) == 2
     complaint = capsys.readouterr().err.splitlines()[-1]
     assert complaint.startswith("apo-bench: ")
     assert said in complaint
@@ -166,7 +166,7 @@ def test_answers_that_are_not_those_of_the_track_are_refused_before_a_trial_runs
 def test_a_file_of_answers_may_be_large_and_answer_more_than_is_asked(
     tmp_path: Path, requests: list[dict[str, Any]]
 ) -> None:
-    answers = [as_seen(request) for request in requests]
+    answers = [is_uncorrected(request) for request in requests]
     others = [{**answers[0], "id": f"another track {i}", "goals": answers[0]["goals"] * 50} for i in range(400)]
     text = lines([*others, *answers]).rstrip("\n")
     assert len(text) > 2_000_000

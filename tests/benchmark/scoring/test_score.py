@@ -16,11 +16,11 @@ from apo_bench.cli.app import main
 from apo_bench.resources import folder
 
 SMALL = """
-scenarios = ["block_on_block"]
-levels = [1]
-careless = [0]
+scenario = ["block_on_block"]
+noise_level = [1]
+human_error_scale = [0]
 trials = 2
-grasps = ["weld"]
+grasp = ["weld"]
 
 [track]
 schema = "apo-bench/track/1"
@@ -52,8 +52,8 @@ def scored(small: Path, name: str, *entrant: str) -> dict[str, str]:
 @pytest.mark.parametrize("name", track_names())
 def test_every_track_is_no_larger_than_was_promised(name: str) -> None:
     track = read_track(name)
-    loaded = load_all(track.of("none", track.arms[0]))
-    for method in ("contact-robust", "contact+feel"):
+    loaded = load_all(track.of("uncorrected", track.arms[0]))
+    for method in ("contact-robust", "contact+probe"):
         grids = [grid for arm in track.arms for grid in track.of(method, arm)]
         for grid in grids:
             check_grids([grid])
@@ -65,8 +65,8 @@ def test_every_track_is_no_larger_than_was_promised(name: str) -> None:
 
 def test_a_program_and_a_file_of_answers_score_as_the_same_corrector_in_python(small: Path) -> None:
     python = shutil.which("python3") or shutil.which("python")
-    as_seen = scored(small, "none", "none")
-    assert scored(small, "program", "--command", f"{python} seen.py") == as_seen
+    is_uncorrected = scored(small, "uncorrected", "uncorrected")
+    assert scored(small, "program", "--command", f"{python} seen.py") == is_uncorrected
     assert main(["score", "--export", "asked.jsonl", "--track", "small.toml", "--workers", "1"]) == 0
     asked = [json.loads(line) for line in (small / "asked.jsonl").read_text().splitlines()]
     assert len(asked) == 2
@@ -76,7 +76,7 @@ def test_a_program_and_a_file_of_answers_score_as_the_same_corrector_in_python(s
         for r in asked
     ]
     (small / "goals.jsonl").write_text("".join(json.dumps(line) + "\n" for line in goals))
-    assert scored(small, "answers", "--answers", "goals.jsonl") == as_seen
+    assert scored(small, "answers", "--answers", "goals.jsonl") == is_uncorrected
 
 
 def test_an_entry_that_is_there_is_continued_and_made_the_same(small: Path) -> None:
@@ -125,13 +125,13 @@ def test_what_is_wrong_is_said_in_one_sentence(
     ("old", "new", "said"),
     [
         ("[track]", "[tracks]", "table \\[track\\]"),
-        ("careless", "methods = ['none']\ncareless", "no methods"),
+        ("human_error_scale", "methods = ['uncorrected']\ncareless", "no methods"),
         ("track/1", "track/2", "schema"),
         ("title = ", "titel = ", "unknown key 'titel'"),
         ('title = "A small one"', 'title = "x"\nquick_trials = 0', "from 1"),
         ('title = "A small one"', 'title = "x"\noverall = 1', "true or false"),
         ('title = "A small one"', 'title = "x"\narms = []', "at least one"),
-        ("levels", "level", "unknown key 'level'"),
+        ("noise_level", "noise_level", "unknown key 'level'"),
         ("[track]", "[[also]]\nseed = 5\n\n[track]", "begin with the same seed"),
     ],
 )
@@ -147,6 +147,6 @@ def test_a_track_seen_by_an_estimator_is_another_track(small: Path) -> None:
     assert seen.name == "small-megapose-lmo"
     assert seen.hash != track.hash
     assert not seen.overall
-    assert all(noise.endswith("megapose-lmo.toml") for grid in seen.grids for noise in grid.noises)
+    assert all(noise.endswith("megapose-lmo.toml") for grid in seen.grids for noise in grid.noise)
     with pytest.raises(InputError, match="noise file"):
         seen_by(track, "nothing.toml")

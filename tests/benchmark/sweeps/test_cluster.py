@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench import InputError, SweepSettings, run_sweep
+from apo_bench import InputError, SweepConfig, run_sweep
 from apo_bench.benchmark.sweeps import cluster as on_ray
 from apo_bench.benchmark.sweeps import sweep
 from apo_bench.benchmark.sweeps.grid import load_all
@@ -27,7 +27,9 @@ from apo_bench.cli.app import main
 from apo_bench.resources import folder
 from apo_bench.trial.fingerprint import versions
 
-SPEC = SweepSettings(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=10)
+SPEC = SweepConfig(
+    ("carried_bridge",), noise_level=(1.0,), human_error_scale=(0.0,), method=("uncorrected", "paper"), trials=10
+)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
 CODE = """
 import os, time
@@ -138,7 +140,18 @@ def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: l
 @pytest.mark.extras
 def test_a_driver_that_is_stopped_goes_on_later(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
     out = tmp_path / "run"
-    asked = ["--levels", "1", "--careless", "0", "--methods", "none,paper", "--trials", "10", "--out", str(out)]
+    asked = [
+        "--noise-level",
+        "1",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected,paper",
+        "--trials",
+        "10",
+        "--out",
+        str(out),
+    ]
     command = [sys.executable, "-m", "apo_bench.cli.app", "sweep", "carried_bridge", *asked]
     process = subprocess.Popen(
         [*command, "--backend", "ray", "--address", cluster.address],
@@ -163,7 +176,7 @@ def test_a_trial_that_dies_or_hangs_is_one_failed_row(cluster: Any, own: Path) -
     """And files of the current folder, with what they import, travel to the nodes."""
     methods = tuple(f"code_of_mine:{name}" for name in ("dies", "raises", "hangs"))
     shutil.copy(folder("scenarios") / "block_on_block.toml", own / "mine.toml")
-    spec = replace(SPEC, scenarios=("mine.toml",), methods=methods, trials=1)
+    spec = replace(SPEC, scenario=("mine.toml",), method=methods, trials=1)
     rows = run_sweep(spec, own / "run", backend="ray", address=cluster.address, limit_s=4.0)
     assert {row["method"].partition(":")[2]: (row["failure_stage"], row["failure_code"]) for row in rows} == {
         "dies": ("worker", "worker_died"),
@@ -190,8 +203,8 @@ def test_files_below_the_current_folder_travel_and_no_others(
     (own / "deep" / "mine.toml").write_text(text.replace('file = "block"', 'file = "../part.xml"'))
     shutil.copy(folder("assets") / "parts" / "block.xml", own / "part.xml")
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
-    loaded = load_all([replace(SPEC, scenarios=("deep/mine.toml", str(far), "stick_in_tower"))])
-    travel = travelling_files(loaded, (), ("code_of_mine:raises+feel", "noise.toml", "camera", "given", "six_axis"))
+    loaded = load_all([replace(SPEC, scenario=("deep/mine.toml", str(far), "stick_in_tower"))])
+    travel = travelling_files(loaded, (), ("code_of_mine:raises+probe", "noise.toml", "camera", "given", "six_axis"))
     code = {"code_of_mine.py", "helper_of_mine.py"}
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml"} | code
     assert all((own / name).samefile(path) for name, path in travel.items())

@@ -17,7 +17,7 @@ from typing import Any
 import imageio.v3 as imageio
 import pytest
 
-from apo_bench import InputError, SweepSettings, TrialSettings, run_sweep
+from apo_bench import InputError, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.sweeps import pool
 from apo_bench.benchmark.sweeps.stopping import Stopped, stoppable
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Worker
@@ -71,14 +71,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def grid(*methods: str, **more: Any) -> SweepSettings:
-    named = tuple(method if method == "none" else f"unruly:{method}" for method in methods)
-    return SweepSettings(("block_on_block",), (1.0,), (0.0,), named, **{"trials": 1, "fidelity": "contact"} | more)
+def grid(*methods: str, **more: Any) -> SweepConfig:
+    named = tuple(method if method == "uncorrected" else f"unruly:{method}" for method in methods)
+    return SweepConfig(("block_on_block",), (1.0,), (0.0,), named, **{"trials": 1, "fidelity": "near-contact"} | more)
 
 
-MANY = grid("none", "raises", "dies", "nonsense", trials=2)
+MANY = grid("uncorrected", "raises", "dies", "nonsense", trials=2)
 ENDS = {
-    "none": (None, None),
+    "uncorrected": (None, None),
     "unruly:raises": ("correct", "raised"),
     "unruly:nonsense": ("correct", "raised"),
     "unruly:dies": ("worker", "worker_died"),
@@ -97,12 +97,12 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 
 
 def test_rows_are_the_same_bytes_whoever_makes_them_and_a_death_costs_one_trial(two: list[Any], tmp_path: Path) -> None:
-    assert endings(two) == {method: ENDS[method] for method in MANY.methods}
+    assert endings(two) == {method: ENDS[method] for method in MANY.method}
     assert len(two) == 8
     one = run_sweep(MANY, tmp_path / "one", workers=1)
     assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, two))
     alive = [row for row in two if row["failure_stage"] != "worker"]
-    here = run_sweep(grid("none", "raises", "nonsense", trials=2), tmp_path / "here")
+    here = run_sweep(grid("uncorrected", "raises", "nonsense", trials=2), tmp_path / "here")
     assert sorted(map(json.dumps, here)) == sorted(map(json.dumps, alive))
     timing = [json.loads(text) for text in (tmp_path / "one" / "timing.jsonl").read_text().splitlines()]
     assert len(timing) == len(one)
@@ -139,15 +139,25 @@ def test_a_trial_that_hangs_is_ended_at_its_limit_and_the_others_go_on(
 def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     film = tmp_path / "film.gif"
     seen = tmp_path / "seen.json"
-    trial = ["replay", "block_on_block", "--careless", "0", "--fidelity", "contact", "--json", "--trial-limit", "500"]
+    trial = [
+        "replay",
+        "block_on_block",
+        "--human-error-scale",
+        "0",
+        "--fidelity",
+        "near-contact",
+        "--json",
+        "--trial-limit",
+        "500",
+    ]
     written = ["--video", str(film), "--save-observation", str(seen)]
-    assert main([*trial, "--method", "none", *written, "--level", "0.1"]) == 0
+    assert main([*trial, "--method", "uncorrected", *written, "--noise-level", "0.1"]) == 0
     capsys.readouterr()
     assert len(imageio.imread(film, index=None)) > 10
-    measured = ["replay", "block_on_block", "--fidelity", "contact", "--observation", str(seen), "--json"]
+    measured = ["replay", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
     late = json.loads(capsys.readouterr().out)
-    assert (late["failure_code"], late["noise"], late["level"]) == ("time_limit", "measured", None)
+    assert (late["failure_code"], late["noise"], late["noise_level"]) == ("time_limit", "measured", None)
 
 
 def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,7 +165,17 @@ def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) ->
     assert "a limit of -1 s per trial was given" in capsys.readouterr().err
 
 
-TALKS = ["replay", "block_on_block", "--careless", "0", "--fidelity", "contact", "--method", "unruly:talks", "--json"]
+TALKS = [
+    "replay",
+    "block_on_block",
+    "--human-error-scale",
+    "0",
+    "--fidelity",
+    "near-contact",
+    "--method",
+    "unruly:talks",
+    "--json",
+]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
@@ -172,12 +192,12 @@ def test_a_row_on_standard_output_stands_there_alone(
 
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
-    spec = TrialSettings("block_on_block", method="paper", seed=4)
+    spec = TrialConfig("block_on_block", method="paper", seed=4)
     died = lost(spec, "abc", "worker_died")
     late = lost(spec, "abc", "time_limit")
     raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
     assert list(died) == list(late) == list(raised)
-    assert died["spec_hash"] == raised["spec_hash"]
+    assert died["config_hash"] == raised["config_hash"]
     assert (died["success"], died["demonstration"], died["failure_stage"]) == (False, None, "worker")
     assert died["sentence"] == "the process that ran the trial died"
     assert (late["failure_code"], raised["demonstration"]) == ("time_limit", "ok")
@@ -186,7 +206,7 @@ def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
 
 
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
-    batch = (TrialSettings("block_on_block", method="none"),)
+    batch = (TrialConfig("block_on_block", method="uncorrected"),)
     other = SweepInputs({"block_on_block": "0123456789abcdef"}, versions())
     with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
         list(Worker(other, {}).run(batch))
@@ -207,7 +227,7 @@ class Deadly:
 def test_processes_that_cannot_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "folder_of_own_modules", Deadly)
     with pytest.raises(RuntimeError, match="worker processes end before they have begun a trial"):
-        pool.run_locally([(TrialSettings("block_on_block"),)], SweepInputs({}, {}), 1, 60.0, lambda row, timing: None)
+        pool.run_locally([(TrialConfig("block_on_block"),)], SweepInputs({}, {}), 1, 60.0, lambda row, timing: None)
 
 
 def count(out: Path) -> int:
@@ -223,13 +243,24 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
 
 
 def started(out: Path, levels: str) -> subprocess.Popen[str]:
-    asked = ["sweep", "block_on_block", "--careless", "0", "--out", str(out), "--workers", "2", "--levels", levels]
+    asked = [
+        "sweep",
+        "block_on_block",
+        "--human-error-scale",
+        "0",
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+        "--noise-level",
+        levels,
+    ]
     return subprocess.Popen(
-        [sys.executable, "-m", "apo_bench.cli.app", *asked, "--methods", "unruly:slow", "--trials", "1"],
+        [sys.executable, "-m", "apo_bench.cli.app", *asked, "--method", "unruly:slow", "--trials", "1"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
         start_new_session=True,
     )

@@ -15,21 +15,23 @@ from typing import Any
 
 import pytest
 
-from apo_bench import InputError, SweepSettings, load_scenario
+from apo_bench import InputError, SweepConfig, load_scenario
 from apo_bench.assembly import Outcome
 from apo_bench.benchmark.sweeps import sweep as runner
 from apo_bench.benchmark.sweeps import worker
 from apo_bench.benchmark.sweeps.grid import load_all, units
-from apo_bench.records import CORRECTORS, ENV_ID, ROW, row_key, setting_columns, trial_key
+from apo_bench.records import CORRECTORS, ENV_ID, RECORD_SCHEMA, record_key, setting_columns, trial_key
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import outcome_columns as row_module
 from apo_bench.trial import trial
-from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.fingerprint import config_hash
 from apo_bench.trial.outcome_columns import result
 
-METHODS = ("oracle", "none", "paper")
-SPEC = SweepSettings(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
+METHODS = ("oracle", "uncorrected", "paper")
+SPEC = SweepConfig(
+    ("stick_in_tower",), noise_level=(0.0, 1.0), human_error_scale=(1.0,), method=METHODS, trials=3, seed=10
+)
 ROWS = 3 * (1 + 2 * 2)
 LOAD = functools.cache(load_scenario)
 
@@ -45,21 +47,21 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
     def record(spec: Any, scene: Any) -> str:
         did["demonstration"] += 1
-        return f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
+        return f"{scene.scenario.name} {spec.human_error_scale} {spec.seed} {spec.pose_source}"
 
     def run_trial(spec: Any, scene: Any, *, simulated: str, content: str, cache: Any) -> dict[str, Any]:
         did["trial"] += 1
-        assert simulated == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
-        hashed = spec_hash(spec, content)
+        assert simulated == f"{scene.scenario.name} {spec.human_error_scale} {spec.seed} {spec.pose_source}"
+        hashed = config_hash(spec, content)
         success = spec.seed % 2 == 0
         ended = result(
             Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
         )
-        ended |= {"demonstration": "ok", "sim_seconds": 1.0, "extra_operations": 0}
+        ended |= {"demonstration": "ok", "sim_time_s": 1.0, "extra_operations": 0}
         return {
-            "schema": ROW,
+            "schema": RECORD_SCHEMA,
             "env_id": ENV_ID,
-            "spec_hash": hashed,
+            "config_hash": hashed,
             **setting_columns(spec, scene.scenario.name),
             **ended,
         }
@@ -74,7 +76,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 def test_the_grid_is_every_combination_once() -> None:
     two = ("stick_in_tower", "stick_on_castles")
-    spec = SweepSettings(two, (0, 1, 1), (0, 1), METHODS, clearances_mm=(0.25, 0.5), trials=2)
+    spec = SweepConfig(two, (0, 1, 1), (0, 1), METHODS, clearance_mm=(0.25, 0.5), trials=2)
     loaded = load_all([spec])
     keys = [trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
@@ -82,26 +84,28 @@ def test_the_grid_is_every_combination_once() -> None:
 
 
 def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None:
-    spec = replace(SPEC, noises=("isotropic", "per-part"), relations=("given", "missed", "shifted:3.0", "shifted:3"))
-    assert spec.relations == ("given", "missed", "shifted:3")
+    spec = replace(
+        SPEC, noise=("isotropic", "per-part"), contact_source=("given", "false-negative", "shifted:3.0", "shifted:3")
+    )
+    assert spec.contact_source == ("given", "false-negative", "shifted:3")
     loaded = load_all([spec])
     trials = [t for unit in units([spec], loaded) for t in unit]
     keys = {trial_key(t, "stick_in_tower") for t in trials}
     assert len(keys) == len(trials) == 3 * (1 + 2 * 2 * (1 + 3))
-    met = {m: {(t.noise, t.relations) for t in trials if t.method == m} for m in spec.methods}
+    met = {m: {(t.noise, t.contact_source) for t in trials if t.method == m} for m in spec.method}
     assert met["oracle"] == {("isotropic", "given")}
-    assert met["none"] == {("isotropic", "given"), ("per-part", "given")}
+    assert met["uncorrected"] == {("isotropic", "given"), ("per-part", "given")}
     assert len(met["paper"]) == 6
 
 
 def test_only_methods_that_can_ask_look_again() -> None:
-    spec = replace(SPEC, methods=("oracle", "none", "contact", "contact-robust"), looks=(0, 2.0, 2))
-    assert spec.looks == (0, 2)
+    spec = replace(SPEC, method=("oracle", "uncorrected", "contact", "contact-robust"), max_reobservations=(0, 2.0, 2))
+    assert spec.max_reobservations == (0, 2)
     trials = [t for unit in units([spec], load_all([spec])) for t in unit]
-    met = {m: {t.looks for t in trials if t.method == m} for m in spec.methods}
-    assert met == {"oracle": {0}, "none": {0}, "contact": {0}, "contact-robust": {0, 2}}
+    met = {m: {t.max_reobservations for t in trials if t.method == m} for m in spec.method}
+    assert met == {"oracle": {0}, "uncorrected": {0}, "contact": {0}, "contact-robust": {0, 2}}
     with pytest.raises(InputError, match=r"must be a list \(each entry a whole number\), got a tuple with 1\.5"):
-        replace(SPEC, looks=(1.5,))
+        replace(SPEC, max_reobservations=(1.5,))
 
 
 def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
@@ -112,20 +116,22 @@ def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
 
 
 def test_grids_whose_seeds_lie_far_apart_are_laid_out_at_once() -> None:
-    far = [replace(SPEC, trials=2, seed=seed, methods=("none",)) for seed in (10**12, 0)]
+    far = [replace(SPEC, trials=2, seed=seed, method=("uncorrected",)) for seed in (10**12, 0)]
     assert [unit[0].seed for unit in units(far, load_all(far))] == [0, 1, 10**12, 10**12 + 1]
 
 
 def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared() -> None:
-    assert SweepSettings(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact-robust")
+    assert SweepConfig(("stick_in_tower",)).method == ("oracle", "uncorrected", "paper", "contact-robust")
     for method in CORRECTORS:
-        assert replace(SPEC, methods=(method,)).methods == (method,)
+        assert replace(SPEC, method=(method,)).methods == (method,)
 
 
 def test_the_oracle_runs_once_per_seed() -> None:
     loaded = load_all([SPEC])
     oracle = [t for unit in units([SPEC], loaded) for t in unit if t.method == "oracle"]
-    assert [(t.seed, t.level_mm, t.level_deg, t.careless) for t in oracle] == [(k, 0.0, 0.0, 0.0) for k in (10, 11, 12)]
+    assert [(t.seed, t.noise_mm, t.noise_deg, t.human_error_scale) for t in oracle] == [
+        (k, 0.0, 0.0, 0.0) for k in (10, 11, 12)
+    ]
 
 
 def test_each_scenario_has_its_own_clearance_by_default() -> None:
@@ -139,11 +145,11 @@ def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path
     assert len(rows) == ROWS
     assert read_rows(tmp_path / "new" / "run") == rows
     timing = [json.loads(line) for line in (tmp_path / "new" / "run" / "timing.jsonl").open()]
-    assert [row_key(t) for t in timing] == [row_key(r) for r in rows]
+    assert [record_key(t) for t in timing] == [record_key(r) for r in rows]
     assert {"trial_s", "demonstrate_s", "host", "worker"} <= set(timing[0])
     run = json.loads((tmp_path / "new" / "run" / "run.json").read_text())
     assert run["command"] == "apo-bench sweep ..."
-    assert run["grids"][0]["clearances_mm"] == {"stick_in_tower": [0.25]}
+    assert run["grids"][0]["clearance_mm"] == {"stick_in_tower": [0.25]}
     assert run["versions"]["mujoco"]
 
 
@@ -166,7 +172,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
     quick = trial.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
-        if (spec.seed, spec.method, spec.level_mm) == (11, "paper", 0.0):
+        if (spec.seed, spec.method, spec.noise_mm) == (11, "paper", 0.0):
             raise KeyboardInterrupt
         return quick(spec, scene, **more)
 
@@ -205,10 +211,10 @@ def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_pa
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"levels": (0.0, 2.0)}, "grid: levels was"),
+        ({"noise_level": (0.0, 2.0)}, "grid: levels was"),
         ({"seed": 11}, "grid: seed was 10, now 11"),
         ({"grasps": ("weld",)}, "grid: grasps"),
-        ({"clearances_mm": (0.5,)}, "grid: clearances_mm"),
+        ({"clearance_mm": (0.5,)}, "grid: clearances_mm"),
         ({"scenarios": ("stick_on_castles",)}, "grid: clearances_mm"),
     ],
 )
@@ -244,11 +250,11 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     ("change", "words"),
     [
         ({"scenarios": ()}, "no scenarios"),
-        ({"levels": ()}, "no levels"),
-        ({"levels": (-1.0,)}, "level of -1"),
-        ({"levels": (float("nan"),)}, "level of nan"),
-        ({"careless": (99.0,)}, "carelessness of 99"),
-        ({"clearances_mm": (-0.1,)}, "clearance of -0.1"),
+        ({"noise_level": ()}, "no levels"),
+        ({"noise_level": (-1.0,)}, "level of -1"),
+        ({"noise_level": (float("nan"),)}, "level of nan"),
+        ({"human_error_scale": (99.0,)}, "carelessness of 99"),
+        ({"clearance_mm": (-0.1,)}, "clearance of -0.1"),
         ({"methods": ("oracle", "papr")}, "did you mean 'paper'"),
         ({"trials": 0}, "0 trials"),
         ({"seed": -3}, "seed of -3"),
@@ -263,10 +269,10 @@ def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: s
     ("change", "words"),
     [
         ({"scenarios": ("stick_in_towr",)}, "did you mean 'stick_in_tower'"),
-        ({"noises": ("isotropc",)}, "did you mean 'isotropic'"),
-        ({"relations": ("mised",)}, "did you mean 'missed'"),
-        ({"relations": ("shifted:0",)}, "a size above 0 and up to 50 mm is allowed: shifted:3"),
-        ({"relations": ()}, "no relations were given"),
+        ({"noise": ("isotropc",)}, "did you mean 'isotropic'"),
+        ({"contact_source": ("mised",)}, "did you mean 'false-negative'"),
+        ({"contact_source": ("shifted:0",)}, "a size above 0 and up to 50 mm is allowed: shifted:3"),
+        ({"contact_source": ()}, "no relations were given"),
         ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
         ({"methods": ("json:nothing",)}, "unknown corrector in module json 'nothing'"),
     ],
@@ -288,31 +294,38 @@ def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
     copy = tmp_path / "stick_in_tower.toml"
     copy.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
     with pytest.raises(InputError, match="two scenarios called 'stick_in_tower'"):
-        runner.run_sweep(replace(SPEC, scenarios=("stick_in_tower", str(copy))), tmp_path / "run")
+        runner.run_sweep(replace(SPEC, scenario=("stick_in_tower", str(copy))), tmp_path / "run")
 
 
 def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp_path: Path) -> None:
-    spec = replace(SPEC, eyes=("noise", "range"), noises=("isotropic", "camera"), methods=("oracle", "none"))
+    spec = replace(
+        SPEC,
+        pose_source=("noise-model", "depth-camera"),
+        noise=("isotropic", "camera"),
+        method=("oracle", "uncorrected"),
+    )
     loaded = load_all([spec])
     trials = [trial for unit in units([spec], loaded) for trial in unit]
-    seen = Counter((t.eye, t.noise, t.level_deg > 0.0) for t in trials if t.method == "none" and t.level_mm > 0.0)
+    seen = Counter(
+        (t.pose_source, t.noise, t.noise_deg > 0.0) for t in trials if t.method == "uncorrected" and t.noise_mm > 0.0
+    )
     assert set(seen) == {("noise", "isotropic", True), ("noise", "camera", True), ("range", "range", False)}
     assert len(set(seen.values())) == 1
-    assert {(t.eye, t.noise) for t in trials if t.method == "oracle"} == {("noise", "isotropic")}
-    rows = runner.run_sweep(spec, tmp_path / "eyes")
-    assert len(rows) == len(trials) == len({row_key(row) for row in rows})
-    per_careless = {(t.scenario, t.seed, t.careless, t.eye) for t in trials}
+    assert {(t.pose_source, t.noise) for t in trials if t.method == "oracle"} == {("noise", "isotropic")}
+    rows = runner.run_sweep(spec, tmp_path / "pose_source")
+    assert len(rows) == len(trials) == len({record_key(row) for row in rows})
+    per_careless = {(t.scenario, t.seed, t.human_error_scale, t.pose_source) for t in trials}
     assert counted["demonstration"] == len(per_careless)
 
 
 def test_there_is_no_such_eye() -> None:
     with pytest.raises(InputError, match="telescope"):
-        replace(SPEC, eyes=("noise", "telescope"))
+        replace(SPEC, pose_source=("noise-model", "telescope"))
 
 
 def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str], tmp_path: Path) -> None:
     rows = runner.run_sweep(SPEC, tmp_path)
-    rows[4]["spec_hash"] = "0" * 16
+    rows[4]["config_hash"] = "0" * 16
     (tmp_path / "trials.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     with pytest.raises(
         InputError, match=r"holds a row of stick_in_tower, method \w+, seed 1\d, that was made with other"
@@ -321,16 +334,16 @@ def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str
 
 
 def test_grasps_are_an_axis_and_share_demonstrations(counted: Counter[str], tmp_path: Path) -> None:
-    rows = runner.run_sweep(replace(SPEC, grasps=("friction", "weld")), tmp_path)
-    assert len({row_key(row) for row in rows}) == len(rows) == 2 * ROWS
+    rows = runner.run_sweep(replace(SPEC, grasp=("friction", "weld")), tmp_path)
+    assert len({record_key(row) for row in rows}) == len(rows) == 2 * ROWS
     assert {(row["method"], row["grasp"]) for row in rows} == {(m, g) for m in METHODS for g in ("friction", "weld")}
     assert counted == {"scene": 2, "demonstration": 3 * 2, "trial": 2 * ROWS}
 
 
 def test_several_grids_make_one_folder(counted: Counter[str], tmp_path: Path) -> None:
-    further = replace(SPEC, levels=(1.0, 2.0), methods=("paper",), trials=1)
+    further = replace(SPEC, noise_level=(1.0, 2.0), method=("paper",), trials=1)
     rows = runner.run_sweep([SPEC, further], tmp_path)
-    assert len({row_key(row) for row in rows}) == len(rows) == ROWS + 1
+    assert len({record_key(row) for row in rows}) == len(rows) == ROWS + 1
     assert len(json.loads((tmp_path / "run.json").read_text())["grids"]) == 2
     with pytest.raises(InputError, match="it had 2 grids, now 1"):
         runner.run_sweep(SPEC, tmp_path)
@@ -344,7 +357,7 @@ def test_a_file_and_flags_make_the_same_rows(tmp_path: Path, capsys: pytest.Capt
     (tmp_path / "grid.toml").write_text(
         'scenarios = ["block_on_block"]\nlevels = [40, 0]\ncareless = [0]\nmethods = ["snap"]\ntrials = 9\nseed = 2\n'
     )
-    flags = ["block_on_block", "--levels", "40,0", "--careless", "0", "--methods", "snap", "--seed", "2"]
+    flags = ["block_on_block", "--noise-level", "40,0", "--human-error-scale", "0", "--method", "snap", "--seed", "2"]
     written = []
     for asked in ([str(tmp_path / "grid.toml")], flags):
         assert main(["sweep", *asked, "--trials", "1", "--workers", "1", "--out", str(tmp_path / "run")]) == 0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench import InputError, SweepSettings, run_sweep
+from apo_bench import InputError, SweepConfig, run_sweep
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.benchmark.sweeps.sweep_file import is_sweep_file, read_sweep
 from apo_bench.cli.app import main
@@ -14,15 +14,15 @@ from apo_bench.records import CORRECTOR, trial_key
 from apo_bench.resources import folder
 
 WHOLE = """
-scenarios = ["stick_in_tower", "stick_on_castles"]
-noises = ["isotropic", "per-part"]
-levels = [0, 1, [2, 0.5]]
-careless = [1]
-methods = ["none", "paper"]
-grasps = ["friction", "weld"]
-relations = ["given", "missed"]
-eyes = ["noise"]
-clearances_mm = [0.25, 0.5]
+scenario = ["stick_in_tower", "stick_on_castles"]
+noise = ["isotropic", "per-part"]
+noise_level = [0, 1, [2, 0.5]]
+human_error_scale = [1]
+method = ["uncorrected", "paper"]
+grasp = ["friction", "weld"]
+contact_source = ["given", "missed"]
+pose_source = ["noise"]
+clearance_mm = [0.25, 0.5]
 trials = 3
 seed = 7
 arm = "six_axis"
@@ -30,11 +30,11 @@ timestep_ms = 0.5
 fidelity = "full"
 
 [[also]]
-methods = ["oracle"]
+method = ["oracle"]
 
 [[also]]
-scenarios = ["block_on_block"]
-levels = [4]
+scenario = ["block_on_block"]
+noise_level = [4]
 trials = 1
 """
 
@@ -47,25 +47,25 @@ def written(folder: Path, text: str | bytes) -> Path:
 
 def test_every_key_is_read_and_further_grids_replace_what_they_name(tmp_path: Path) -> None:
     top, oracle, far = read_sweep(written(tmp_path, WHOLE))
-    assert top == SweepSettings(
-        scenarios=("stick_in_tower", "stick_on_castles"),
-        levels=(0.0, 1.0, (2.0, 0.5)),
-        careless=(1.0,),
-        methods=("none", "paper"),
-        clearances_mm=(0.25, 0.5),
+    assert top == SweepConfig(
+        scenario=("stick_in_tower", "stick_on_castles"),
+        noise_level=(0.0, 1.0, (2.0, 0.5)),
+        human_error_scale=(1.0,),
+        method=("uncorrected", "paper"),
+        clearance_mm=(0.25, 0.5),
         trials=3,
         seed=7,
-        noises=("isotropic", "per-part"),
-        relations=("given", "missed"),
-        grasps=("friction", "weld"),
+        noise=("isotropic", "per-part"),
+        contact_source=("given", "false-negative"),
+        grasp=("friction", "weld"),
         timestep_s=0.0005,
     )
-    assert (oracle.methods, oracle.levels, oracle.trials) == (("oracle",), top.levels, 3)
-    assert (far.scenarios, far.levels, far.methods, far.trials) == (("block_on_block",), (4.0,), top.methods, 1)
+    assert (oracle.method, oracle.noise_level, oracle.trials) == (("oracle",), top.noise_level, 3)
+    assert (far.scenario, far.noise_level, far.method, far.trials) == (("block_on_block",), (4.0,), top.method, 1)
 
 
 def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
-    assert read_sweep(written(tmp_path, 'scenarios = ["pocket_table"]')) == (SweepSettings(("pocket_table",)),)
+    assert read_sweep(written(tmp_path, 'scenarios = ["pocket_table"]')) == (SweepConfig(("pocket_table",)),)
 
 
 def test_settings_of_the_command_line_replace_those_of_every_grid(tmp_path: Path) -> None:
@@ -74,22 +74,26 @@ def test_settings_of_the_command_line_replace_those_of_every_grid(tmp_path: Path
 
 
 def test_trials_of_all_grids_are_united_each_once() -> None:
-    first = SweepSettings(("stick_in_tower",), (0, 1), (0, 1), ("oracle", "none", "paper"), trials=2, seed=5)
-    again = SweepSettings(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
-    other = SweepSettings(("block_on_block",), ((2, 1),), (1,), ("none",), trials=1, seed=6)
+    first = SweepConfig(("stick_in_tower",), (0, 1), (0, 1), ("oracle", "uncorrected", "paper"), trials=2, seed=5)
+    again = SweepConfig(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
+    other = SweepConfig(("block_on_block",), ((2, 1),), (1,), ("uncorrected",), trials=1, seed=6)
     loaded = load_all([first, again, other])
     trials = [t for unit in units([first, again, other], loaded) for t in unit]
     keys = [trial_key(t, loaded[t.scenario].name) for t in trials]
     assert len(set(keys)) == len(keys) == 2 * (1 + 2 * 2 * 2) + 1 * (1 + 2) + 1
-    assert [(t.seed, t.level_mm, t.level_deg) for t in trials if t.scenario == "block_on_block"] == [(6, 2.0, 1.0)]
+    assert [(t.seed, t.noise_mm, t.noise_deg) for t in trials if t.scenario == "block_on_block"] == [(6, 2.0, 1.0)]
     for unit in units([first, again, other], loaded):
-        assert len({(t.scenario, t.clearance_mm, t.seed, t.careless, t.eye) for t in unit}) == 1
+        assert len({(t.scenario, t.clearance_mm, t.seed, t.human_error_scale, t.pose_source) for t in unit}) == 1
 
 
 def test_numbers_are_spelled_as_flags_spell_them() -> None:
     """Rows are compared byte by byte: 2 and 2.0, 0.0 and -0.0 are the same number."""
-    spec = SweepSettings(("block_on_block",), (2, -0.0), (0,), ("none",), clearances_mm=(1,), trials=1)
-    said = [(t.level_mm, t.level_deg, t.careless, t.clearance_mm) for u in units([spec], load_all([spec])) for t in u]
+    spec = SweepConfig(("block_on_block",), (2, -0.0), (0,), ("uncorrected",), clearance_mm=(1,), trials=1)
+    said = [
+        (t.noise_mm, t.noise_deg, t.human_error_scale, t.clearance_mm)
+        for u in units([spec], load_all([spec]))
+        for t in u
+    ]
     assert repr(said) == "[(2.0, 2.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)]"
 
 
@@ -110,28 +114,28 @@ BAD: list[tuple[str | bytes, str]] = [
     (NEEDS + "also = [1]", "also: further grids are tables"),
     (NEEDS + "[[also]]\nmethods = []", "also 1: no methods were given for the sweep; at least one is needed"),
     (NEEDS + "levels = 2", "levels: a list is needed, 2 was given; write levels = [...]"),
-    (NEEDS + "levels = ['1']", "levels of SweepSettings must be a list"),
+    (NEEDS + "levels = ['1']", "levels of SweepConfig must be a list"),
     (NEEDS + "levels = [nan]", "a level of nan was given; a number from 0 to 50 is allowed"),
     (NEEDS + "levels = [1e999]", "a level of inf was given; a number from 0 to 50 is allowed"),
-    (NEEDS + "levels = [[1, 2, 3]]", "levels of SweepSettings must be a list"),
+    (NEEDS + "levels = [[1, 2, 3]]", "levels of SweepConfig must be a list"),
     (NEEDS + "levels = [[1, 'a']]", "got a tuple with 'a' in it"),
     (NEEDS + "levels = [[1000, 1]]", "a level in mm of 1000 was given; a number from 0 to 50 is allowed"),
     (NEEDS + "clearances_mm = [9]", "a clearance of 9 was given; a number from 0 to 5 is allowed"),
-    (NEEDS + "careless = [[1, 1]]", "careless of SweepSettings must be a list"),
-    (NEEDS + "trials = true", "trials of SweepSettings must be a whole number, got True"),
+    (NEEDS + "careless = [[1, 1]]", "careless of SweepConfig must be a list"),
+    (NEEDS + "trials = true", "trials of SweepConfig must be a whole number, got True"),
     (NEEDS + "trials = 1000000", "trials, and at most 1,000,000 are allowed in one folder"),
     (NEEDS + "seed = -1", "a seed of -1 was given; whole numbers from 0"),
     (NEEDS + "seed = 9007199254740991", "a seed of 9007199254741090 was given"),
-    (NEEDS + "methods = [1]", "methods of SweepSettings must be a list (each entry a text)"),
-    (NEEDS + "methods = ['papr']", "unknown method 'papr'; did you mean 'paper'?"),
+    (NEEDS + "method = [1]", "method of SweepConfig must be a list (each entry a text)"),
+    (NEEDS + "method = ['papr']", "unknown method 'papr'; did you mean 'paper'?"),
     (NEEDS + "eyes = ['telescope']", "unknown eye 'telescope'"),
-    (NEEDS + "fidelity = 1", "fidelity of SweepSettings must be a text, got 1"),
-    (NEEDS + "arm = 1", "arm of SweepSettings must be a text, got 1"),
-    ("scenarios = [1]", "scenarios of SweepSettings must be a list (each entry a text)"),
+    (NEEDS + "fidelity = 1", "fidelity of SweepConfig must be a text, got 1"),
+    (NEEDS + "arm = 1", "arm of SweepConfig must be a text, got 1"),
+    ("scenarios = [1]", "scenarios of SweepConfig must be a list (each entry a text)"),
     (NEEDS + "timestep_ms = 0", "timestep_ms: a finite number above 0 is needed, 0 was given"),
     (NEEDS + "timestep_ms = 5", "a time step of 5 ms was given"),
     (NEEDS + "eyes = ['noise', 'range']\nlevels = [[1, 2]]", "given with the eye 'range'; one number is allowed"),
-    (NEEDS + "levels = [1979-05-27]", "levels of SweepSettings must be a list"),
+    (NEEDS + "levels = [1979-05-27]", "levels of SweepConfig must be a list"),
     (NEEDS + "levels = [1", "this is not TOML: Unclosed array (at end of document)"),
     (b"\xff\xfe" + NEEDS.encode(), "the file is not UTF-8 text (byte 0)"),
     ("scenarios = ['stick_in_towr']", "did you mean 'stick_in_tower'"),
@@ -162,8 +166,8 @@ def test_the_command_says_it_and_ends_with_2(case: int, tmp_path: Path, capsys: 
     ("more", "words"),
     [
         (["stick_in_tower"], "was given together with 1 more; name scenarios in the file"),
-        (["--levels", "1"], "--levels was given together with the sweep file"),
-        (["--clearance", "1"], "write clearances_mm into the file"),
+        (["--noise-level", "1"], "--noise-level was given together with the sweep file"),
+        (["--clearance-mm", "1"], "write clearances_mm into the file"),
         (["--trials", "0"], "0 trials were given"),
         (["--fidelity", "half"], "unknown fidelity 'half'. Known: contact, full."),
         (["--trial-limit", "0"], "a limit of 0 s per trial was given"),
@@ -192,18 +196,20 @@ def test_files_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_grids_of_one_sweep_have_one_arm_and_fidelity() -> None:
-    first = SweepSettings(("block_on_block",))
-    with pytest.raises(InputError, match="fidelity of a sweep is full and contact; run a sweep for each"):
-        run_sweep([first, SweepSettings(("block_on_block",), fidelity="contact")], "/no/such/folder")
+    first = SweepConfig(("block_on_block",))
+    with pytest.raises(InputError, match="fidelity of a sweep is full and near-contact; run a sweep for each"):
+        run_sweep([first, SweepConfig(("block_on_block",), fidelity="near-contact")], "/no/such/folder")
     with pytest.raises(InputError, match="no grid was given"):
         run_sweep([], "/no/such/folder")
 
 
 def test_the_demo_meets_what_a_first_look_needs() -> None:
     """Careful and careless humans, levels enough for a curve, measured errors, and the default corrector."""
-    grids = read_sweep(Path(__file__).parents[2] / "benchmarks" / "demo.toml")
-    assert {x for grid in grids for x in grid.careless} == {0.0, 1.0}
-    assert len(grids[0].levels) >= 7
-    assert "megapose-tless" in {name for grid in grids for name in grid.noises}
-    assert {"none", "snap", "by-heart", "contact", CORRECTOR, "oracle"} == {m for grid in grids for m in grid.methods}
+    grids = read_sweep(Path(__file__).parents[3] / "benchmarks" / "demo.toml")
+    assert {x for grid in grids for x in grid.human_error_scale} == {0.0, 1.0}
+    assert len(grids[0].noise_level) >= 7
+    assert "megapose-tless" in {name for grid in grids for name in grid.noise}
+    assert {"uncorrected", "snap", "nominal", "contact", CORRECTOR, "oracle"} == {
+        m for grid in grids for m in grid.method
+    }
     assert all(grid.trials >= 10 for grid in grids)

@@ -216,7 +216,7 @@ def test_numbers_that_overflow_are_not_finite() -> None:
 def test_a_careless_human_frees_the_candidates_of_the_paper(
     name: str, freed: tuple[int, ...], size: float, sign: int, low: float
 ) -> None:
-    scene, goals = scenes.careless(name, sign * size, low)
+    scene, goals = scenes.human_error(name, sign * size, low)
     found = paper(scenes.seen(scene, goals))
     assert (found.status, tuple(k + 1 for k in found.freed)) == ("converged", freed)
     assert found.gap_before_m == pytest.approx(size * 1e-3)

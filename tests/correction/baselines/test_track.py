@@ -52,7 +52,7 @@ def spelled(found: Correction) -> str:
 @given(size=SIZES, low=st.sampled_from([0.0, 0.25]))
 @settings(max_examples=8, deadline=None)
 def test_the_sets_of_the_paper_whatever_the_size_of_the_error(name: str, size: float, low: float) -> None:
-    scene, goals = scenes.careless(name, size, low)
+    scene, goals = scenes.human_error(name, size, low)
     found = paper_track(scenes.seen(scene, goals))
     n = len(goals)
     assert counted(found, n) == LAST[name]
@@ -67,7 +67,7 @@ def test_the_sets_of_the_paper_whatever_the_size_of_the_error(name: str, size: f
 
 @pytest.mark.parametrize("name", LAST)
 def test_the_oldest_goals_stay_and_all_contacts_hold(name: str) -> None:
-    scene, goals = scenes.careless(name, 3.0)
+    scene, goals = scenes.human_error(name, 3.0)
     found = paper_track(scenes.seen(scene, goals))
     assert largest_gap(scene.assembly, scene.start, found.goals) < 1e-8
     assert found.gap_before_m == pytest.approx(3e-3)
@@ -104,7 +104,7 @@ def test_the_schedule_ends_at_the_goals(name: str, level: float) -> None:
 
 def test_before_an_operation_is_seen_it_changes_nothing() -> None:
     """Whatever comes later, the steps before it are corrected and tried in the same way."""
-    scene, goals = scenes.careless("subassembly_on_castles", 2.0)
+    scene, goals = scenes.human_error("subassembly_on_castles", 2.0)
     goals = scenes.noisy(goals, np.random.default_rng(1), 1.0, 1.0)
     seen = scenes.seen(scene, goals)
     n = 4

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import InputError
-from apo_bench.correction.calibration import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, RobotBelief, Touch, believe, slip_sigmas
 from apo_bench.geometry import pose
 from apo_bench.records.robot_error import Sigmas
 
@@ -49,7 +49,7 @@ def around() -> list[tuple[float, float]]:
 def taught(seed: int = 0) -> RobotBelief:
     """A belief of which every unknown is other than zero."""
     rng = np.random.default_rng(seed)
-    belief = believe(UNSTATED, 6, MIDDLE).grasp(3, FREE)
+    belief = believe(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
     for _ in range(12):
         n = rng.standard_normal(3)
         n /= np.linalg.norm(n)
@@ -72,7 +72,7 @@ def test_what_is_commanded_really_comes_to_be() -> None:
 
 
 def test_without_touches_nothing_moves() -> None:
-    belief = believe(UNSTATED, 6, MIDDLE).grasp(0, slip_sigmas(UNSTATED))
+    belief = believe(UNKNOWN, 6, MIDDLE).grasp(0, slip_sigmas(UNKNOWN))
     assert_array_equal(belief.touch().mean, belief.mean)
     assert_allclose(belief.real(DOWN, jacobian()), DOWN, atol=1e-16)
     assert_allclose(belief.goal_tip(DOWN @ HELD, 0, HELD), DOWN, atol=1e-15)
@@ -122,7 +122,7 @@ def test_laying_flush_tells_height_and_tilts_in_the_hand_alone() -> None:
 def test_the_order_of_touches_does_not_matter() -> None:
     E = displaced(np.array([0.3e-3, 0.5e-3, -0.9e-3, 2e-3, 3e-3, -1e-3]))
     touches = [touch_of(E, at, 5e-5) for at in around()] + [touch_of(E, (0.5, 0.1), 5e-5, off_m=3e-3)]
-    prior = believe(UNSTATED, 6, MIDDLE)
+    prior = believe(UNKNOWN, 6, MIDDLE)
     first = prior.touch(*touches)
     assert [one.offset for one in first.refused] == [touches[3].offset]
     for order in permutations(touches):
@@ -153,11 +153,11 @@ def test_what_is_known_exactly_stays_so() -> None:
 
 def test_a_grasp_made_anew_forgets_the_part_and_keeps_the_robot() -> None:
     belief = taught()
-    anew = belief.grasp(3, slip_sigmas(UNSTATED))
+    anew = belief.grasp(3, slip_sigmas(UNKNOWN))
     assert_array_equal(anew.held(3, HELD), HELD)
     assert_array_equal(anew.real(DOWN, jacobian()), belief.real(DOWN, jacobian()))
     assert_allclose(anew.touch().mean[:21], belief.mean, atol=1e-12)
-    assert_allclose(np.sqrt(np.diag(anew.covariance)[21:]), slip_sigmas(UNSTATED))
+    assert_allclose(np.sqrt(np.diag(anew.covariance)[21:]), slip_sigmas(UNKNOWN))
     assert anew.touches == belief.touches
 
 
@@ -194,7 +194,7 @@ def test_a_belief_survives_pickling() -> None:
 
 
 def test_wrong_requests_get_one_sentence() -> None:
-    belief = believe(UNSTATED, 6, MIDDLE)
+    belief = believe(UNKNOWN, 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 2 was given; grasps so far: none; call"):
         belief.held(2, HELD)
     with pytest.raises(InputError, match=r"the Jacobian cannot be used: an array of shape \(6, 6\) is needed"):
@@ -206,15 +206,15 @@ def test_wrong_requests_get_one_sentence() -> None:
     with pytest.raises(InputError, match=r"standard deviations cannot be used: an array of shape \(6\) is needed"):
         belief.grasp(0, np.zeros(3))
     with pytest.raises(InputError, match="-1 joints were given"):
-        believe(UNSTATED, -1, MIDDLE)
+        believe(UNKNOWN, -1, MIDDLE)
     with pytest.raises(InputError, match=r"1\.5 joints were given"):
-        believe(UNSTATED, 1.5, MIDDLE)  # type: ignore[arg-type]
+        believe(UNKNOWN, 1.5, MIDDLE)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a str was given as sigmas; give UNSTATED, or"):
-        believe("unstated", 6, MIDDLE)  # type: ignore[arg-type]
+        believe("unknown", 6, MIDDLE)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a list was given as a touch; give each as a Touch"):
         belief.touch([])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the middle cannot be used: every number must be finite"):
-        believe(UNSTATED, 6, np.full(3, np.nan))
+        believe(UNKNOWN, 6, np.full(3, np.nan))
     with pytest.raises(InputError, match="the standard deviations cannot be used"):
         believe(Sigmas(hand_eye=(np.nan, 0.0)), 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 0 was given"):

@@ -21,7 +21,7 @@ from apo_bench import (
 from apo_bench.assembly import SharedError
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.viz.explain_text import sentences
 
 
@@ -34,7 +34,9 @@ def shown(name: str, seed: int) -> Demonstration:
 
 def seen(model: str, name: str = "pocket_table", seed: int = 0, level: float = 2.0) -> tuple[Observation, np.ndarray]:
     demonstration = shown(name, seed)
-    made = make_noise(model, Level(level, level))(demonstration.assembly, demonstration, np.random.default_rng(seed))
+    made = make_noise(model, NoiseLevel(level, level))(
+        demonstration.assembly, demonstration, np.random.default_rng(seed)
+    )
     return made, np.array(demonstration.goals)
 
 
@@ -75,7 +77,7 @@ def test_the_test_and_the_regions_are_those_of_the_tails() -> None:
     covered = []
     for seed in range(50):
         observation, truth = seen(
-            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5
+            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, noise_level=0.5
         )
         made = correct(observation, "contact")
         p.append(made.test.p_value)
@@ -112,7 +114,7 @@ def test_what_is_known_of_the_camera_is_said() -> None:
 
 
 def test_a_shared_error_above_its_covariance_is_refused() -> None:
-    observation, _ = seen("isotropic", level=1.0)
+    observation, _ = seen("isotropic", noise_level=1.0)
     large = SharedError("camera", (0, 1), np.diag(np.repeat([0.1, 1.0], 3) ** 2), np.eye(4))
     with pytest.raises(InputError, match="the shared errors 'camera' are larger than the covariances"):
         correct(replace(observation, shared=(large,)), "contact")

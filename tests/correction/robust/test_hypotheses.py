@@ -28,9 +28,9 @@ from apo_bench.geometry import pose
 from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.failures import make_failures
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.relations import make_relations, with_relations
+from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.correction.robust.test_looks import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
@@ -171,7 +171,7 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     layout = draw_layout(scenario, np.random.default_rng([seed, 30, 0]), 0.0)
     n = len(layout.goals)
     first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
-    noise = make_failures("flips", Level(1.0, 1.0), repeat=0.8)
+    noise = make_failures("flips", NoiseLevel(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
     looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
     assert correct(seen, look=looks).ok
@@ -214,8 +214,8 @@ def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
     scenario = load_scenario("gearbox")
     layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
     first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((10, 6, 6)))
-    seen = make_noise("isotropic", Level(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
-    wrong = with_relations(seen, make_relations("false"), layout.goals, np.random.default_rng([13, 9]))
+    seen = make_noise("isotropic", NoiseLevel(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
+    wrong = with_contacts(seen, make_contacts("false"), layout.goals, np.random.default_rng([13, 9]))
     found = correct(wrong)
     assert found.ok
     assert found.dropped
@@ -228,7 +228,7 @@ def test_all_operations_may_be_false_together(seed):
     layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
     nothing = np.zeros((2, 6, 6))
     truth = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
-    observation = observe(truth, make_noise("isotropic", Level(1.0, 1.0)), np.random.default_rng(seed))
+    observation = observe(truth, make_noise("isotropic", NoiseLevel(1.0, 1.0)), np.random.default_rng(seed))
     found = correct(replace(observation, goals=observation.goals[::-1]), "contact-robust")
     assert found.ok
     assert found.sentence.endswith("seen in each other's place: operation 1, 2")

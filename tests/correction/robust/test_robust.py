@@ -27,8 +27,8 @@ from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
-from apo_bench.perception.observation.noise import Level, make_noise
-from apo_bench.perception.observation.relations import culprit, make_relations, with_relations
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, with_contacts
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.shipped import BOXES
 
@@ -42,10 +42,10 @@ def shown(name, seed=0):
     return scenario, layout, Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
 
 
-def look(name, seed, level=1.0):
+def look(name, seed, noise_level=1.0):
     _, _, demonstration = shown(name, seed)
     rng = np.random.default_rng([seed, BOXES.index(name)])
-    return make_noise("isotropic", Level(level, level))(demonstration.assembly, demonstration, rng)
+    return make_noise("isotropic", NoiseLevel(noise_level, noise_level))(demonstration.assembly, demonstration, rng)
 
 
 def astray(observation, k, seed=0):
@@ -107,7 +107,7 @@ def test_what_was_missed_is_inferred(name):
 
 def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one():
     scenario, layout, demonstration = shown("vanished_fixture", 4)
-    exact = make_noise("isotropic", Level(0.0, 0.0))(scenario.assembly, demonstration, np.random.default_rng(0))
+    exact = make_noise("isotropic", NoiseLevel(0.0, 0.0))(scenario.assembly, demonstration, np.random.default_rng(0))
     last = len(scenario.assembly) - 1
     inferred = inferred_goals(astray(exact, last), [last])
     assert inferred.baseless == ()
@@ -212,8 +212,8 @@ def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():
 def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
     observation = look("vanished_fixture", 5)
-    wrong = with_relations(
-        observation, make_relations("shifted:10"), shown("vanished_fixture", 5)[1].goals, np.random.default_rng(1)
+    wrong = with_contacts(
+        observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].goals, np.random.default_rng(1)
     )
     found = correct(wrong, "contact-robust")
     assert found.ok
@@ -241,7 +241,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     """Without the whole relation the goal would be as far off as it was seen."""
     observation = look("pocket_table", seed)
     truth = shown("pocket_table", seed)[1].goals
-    wrong = with_relations(observation, make_relations("shifted:5"), truth, np.random.default_rng(seed))
+    wrong = with_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
     found = correct(wrong, "contact-robust")
     assert found.ok
     assert found.left_out == ()

@@ -13,7 +13,7 @@ from apo_bench.correction.contact.contact import contact_refuse
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.play import fit_covariance, plays
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import chain
 from tests.correction.robust.test_robust import look, shown
@@ -101,7 +101,7 @@ def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     assert by_contact("carried_bridge", deep)["stick.nz on castle1.sfl"] == pytest.approx(3.0 * PLAY_M)
     human = Demonstration(scenario.assembly, layout.start, goals, layout.start, np.zeros((5, 6, 6)), play_m=PLAY_M)
     rng = np.random.default_rng(0)
-    noise = make_noise("isotropic", Level(0.05, 0.05))
+    noise = make_noise("isotropic", NoiseLevel(0.05, 0.05))
     seen = [observe(human, noise, rng) for _ in range(100)]
     refused = sum(made.status == "doubtful" for made in correct_many(seen, contact_refuse))
     assert refused <= 4

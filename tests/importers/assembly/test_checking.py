@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_all_is_well_and_the_robot_that_knows_the_truth_succeeds(folder: Path) -> None:
-    findings = list(check_file(folder / "own.toml", seeds=1, fidelity="contact"))
+    findings = list(check_file(folder / "own.toml", seeds=1, fidelity="near-contact"))
     assert [finding.what for finding in findings if finding.ok] == [
         *("file", "parts", "starts", "ways", "play", "gripper", "reach", "oracle")
     ]
@@ -44,7 +44,9 @@ def test_a_trial_that_fails_is_said_with_the_line_to_change(folder: Path) -> Non
     text = (folder / "own.toml").read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
     path = folder / "far.toml"
     path.write_text(text, encoding="utf-8")
-    failed, summary = (finding for finding in check_file(path, seeds=1, fidelity="contact") if finding.what == "oracle")
+    failed, summary = (
+        finding for finding in check_file(path, seeds=1, fidelity="near-contact") if finding.what == "oracle"
+    )
     assert failed.sentence.startswith(
         "site: move it nearer to the arm, which stands at (-420, 0) mm: the robot with seed 0:"
     )

@@ -91,9 +91,9 @@ def test_noise_alone_is_no_change() -> None:
     view = RangeFinder().views[0]
     rng = np.random.default_rng(1)
     before = range_of({"castle": STANDING}, view)
-    for level in (0.0, 1e-3, 4e-3):
-        noisy = [before + level * rng.standard_normal(before.shape) for _ in range(2)]
-        changed = find_regions(*noisy, level)
+    for noise_level in (0.0, 1e-3, 4e-3):
+        noisy = [before + noise_level * rng.standard_normal(before.shape) for _ in range(2)]
+        changed = find_regions(*noisy, noise_level)
         assert not changed.appeared.any()
         assert not changed.vanished.any()
 
@@ -230,7 +230,7 @@ def test_levels_scale_one_draw_and_level_zero_is_exact() -> None:
     distance = rng(0).uniform(0.7, 1.0, (2, 30, 40))
     cosine = rng(1).uniform(0.3, 1.0, (2, 30, 40))
     image = RangeImage(distance, cosine)
-    clean, one, two = (finder.sense(image, level, rng(5)) for level in (0.0, 1e-3, 2e-3))
+    clean, one, two = (finder.sense(image, noise_level, rng(5)) for noise_level in (0.0, 1e-3, 2e-3))
     seen = np.isfinite(clean)
     assert (np.isfinite(one) == seen).all()
     assert np.array_equal(clean[seen], distance[seen])

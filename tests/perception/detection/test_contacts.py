@@ -19,7 +19,7 @@ from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
 from apo_bench.perception.observation.models.displaced import floored
 from apo_bench.scenario.file import scenario_names
-from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
+from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
 from tests import scenes
 
 NAMES = sorted(scenes.ALL)
@@ -30,14 +30,16 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
     return {(relation.made, relation.contact) for relation in assembly.relations()}
 
 
-def seen_at(scene: scenes.Scene, seed: int, level: float, play_m: float = 0.0) -> Observation:
+def seen_at(scene: scenes.Scene, seed: int, noise_level: float, play_m: float = 0.0) -> Observation:
     """Goals with noise of so many mm and degrees, which are stated."""
-    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), level, level)
-    return stated(scenes.seen(scene, goals), level, play_m)
+    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), noise_level, noise_level)
+    return stated(scenes.seen(scene, goals), noise_level, play_m)
 
 
-def stated(seen: Observation, level: float, play_m: float = 0.0) -> Observation:
-    covariance = np.tile(np.diag(np.repeat([level * 1e-3, np.radians(level)], 3) ** 2), (len(seen.goals), 1, 1))
+def stated(seen: Observation, noise_level: float, play_m: float = 0.0) -> Observation:
+    covariance = np.tile(
+        np.diag(np.repeat([noise_level * 1e-3, np.radians(noise_level)], 3) ** 2), (len(seen.goals), 1, 1)
+    )
     return replace(seen, covariance=floored(covariance), play_m=play_m)
 
 
@@ -46,12 +48,12 @@ def without_contacts(assembly: Assembly) -> Assembly:
     return replace(assembly, operations=bare)
 
 
-def blocks(apart_mm: float, level: float) -> Observation:
+def blocks(apart_mm: float, noise_level: float) -> Observation:
     """Two blocks on the table, one this far beside the other."""
     solids = [scenes.table(), scenes.block("A"), scenes.block("B")]
     operations = [Operation("A"), Operation("B")]
     scene = scenes.scene(solids, operations, [scenes.mm(0, 0, 25), scenes.mm(50 + apart_mm, 0, 25)])
-    return stated(scenes.seen(scene, scene.goals), level)
+    return stated(scenes.seen(scene, scene.goals), noise_level)
 
 
 def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
@@ -59,12 +61,12 @@ def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("level", [pytest.param(0.0, marks=pytest.mark.numeric), 0.5, 1.0])
-def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
+@pytest.mark.parametrize("noise_level", [pytest.param(0.0, marks=pytest.mark.numeric), 0.5, 1.0])
+def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float) -> None:
     """Rounding can only decide where there is no noise."""
     scene = scenes.ALL[name]()
     for seed in range(3):
-        recognised = recognise(seen_at(scene, seed, level))
+        recognised = recognise(seen_at(scene, seed, noise_level))
         assert contacts(recognised.assembly) == contacts(scene.assembly)
         assert tuple(e.contact for e in recognised.evidence) == tuple(
             r.contact for r in recognised.assembly.relations()
@@ -85,7 +87,7 @@ def test_scenarios_of_the_package_are_recognised_with_their_own_play(name: str) 
 @pytest.mark.parametrize("name", ["stick_in_tower", "subassembly_on_castles", "fixture", "pockets"])
 def test_a_part_that_was_put_aside_still_touches_what_it_touches(name: str) -> None:
     """The carelessness is stated, so a gap of 3 mm is explained; where nothing states it, it is not."""
-    scene, goals = scenes.careless(name, 3.0)
+    scene, goals = scenes.human_error(name, 3.0)
     exact = stated(scenes.seen(scene, goals), 0.1)
     along = 0 if name == "pockets" else 1
     wide = np.array(exact.covariance)
@@ -162,7 +164,7 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
     scene = scenes.stick_on_castles()
     goals = np.array(scene.goals)
     goals[:, 2, 3] += [0.1, 0.2, 0.35]
-    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "recognised")
+    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "detected")
     assert not seen.assembly.relations()
     assert correct(seen, "contact").ok
     assert correct(seen, "paper").ok
@@ -191,8 +193,16 @@ def test_contacts_are_counted_against_the_right_ones() -> None:
     first, second = operations[1].contacts
     operations[1] = replace(operations[1], contacts=(first, Contact(second.environment, second.manipulated)))
     wrong = replace(right, operations=tuple(operations))
-    assert count_contacts(right, wrong) == {"contacts_right": 4, "contacts_missed": 1, "contacts_false": 1}
-    assert count_contacts(right, right) == {"contacts_right": 5, "contacts_missed": 0, "contacts_false": 0}
+    assert count_contacts(right, wrong) == {
+        "contacts_true_positive": 4,
+        "contacts_false_negative": 1,
+        "contacts_false_positive": 1,
+    }
+    assert count_contacts(right, right) == {
+        "contacts_true_positive": 5,
+        "contacts_false_negative": 0,
+        "contacts_false_positive": 0,
+    }
 
 
 @pytest.mark.parametrize(

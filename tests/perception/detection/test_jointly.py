@@ -34,18 +34,18 @@ def with_contacts(seen: Observation, *each: str) -> Assembly:
     return replace(seen.assembly, operations=tuple(operations))
 
 
-def block_at(x: float, y: float, z: float, level: float = 1.0) -> Observation:
+def block_at(x: float, y: float, z: float, noise_level: float = 1.0) -> Observation:
     """One block seen here, in mm."""
     scene = scenes.scene([scenes.table(), scenes.block("A")], [Operation("A")], [scenes.mm(x, y, z)])
-    return stated(scenes.seen(scene, scene.goals), level)
+    return stated(scenes.seen(scene, scene.goals), noise_level)
 
 
-def beside(apart_mm: float, level: float) -> Observation:
+def beside(apart_mm: float, noise_level: float) -> Observation:
     """Two blocks on the table, one this far beside the other."""
     solids = [scenes.table(), scenes.block("A"), scenes.block("B")]
     goals = [scenes.mm(0, 0, 25), scenes.mm(50 + apart_mm, 0, 25)]
     scene = scenes.scene(solids, [Operation("A"), Operation("B")], goals)
-    return stated(scenes.seen(scene, goals), level)
+    return stated(scenes.seen(scene, goals), noise_level)
 
 
 def names(assembly: Assembly) -> set[str]:
@@ -73,10 +73,10 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
 
 def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
     """A block 2 mm above the table: only the vertical and two tilts are asked for."""
-    level = 1.0
+    noise_level = 1.0
     seen = block_at(0, 0, 27)
     estimated = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
-    s = np.array([level * 1e-3, np.radians(level), np.radians(level)])
+    s = np.array([noise_level * 1e-3, np.radians(noise_level), np.radians(noise_level)])
     room = np.hypot(s, [40e-3, np.radians(23.0), np.radians(23.0)])
     by_hand = 2.0 * (
         multivariate_normal(cov=np.diag(s**2)).logpdf([2e-3, 0, 0])
@@ -98,10 +98,10 @@ def test_a_contact_that_others_imply_gains_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("level", [0.5, 2.0])
-def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
+@pytest.mark.parametrize("noise_level", [0.5, 2.0])
+def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float) -> None:
     scene = scenes.ALL[name]()
-    recognised = recognise_jointly(seen_at(scene, 0, level))
+    recognised = recognise_jointly(seen_at(scene, 0, noise_level))
     assert contacts(recognised.assembly) == contacts(scene.assembly)
     assert tuple(e.contact for e in recognised.evidence) == tuple(r.contact for r in recognised.assembly.relations())
     assert recognised.probability is not None
@@ -135,7 +135,7 @@ def test_probabilities_say_what_is_not_certain() -> None:
 
 def test_what_is_let_go_of_lies_on_something_however_far_it_was_seen_above() -> None:
     """3.7 deviations above the table is little beside hanging in the air."""
-    assert names(recognise_jointly(block_at(0, 0, 25 + 15, level=4.0)).assembly) == {"A.nz on table.top"}
+    assert names(recognise_jointly(block_at(0, 0, 25 + 15, noise_level=4.0)).assembly) == {"A.nz on table.top"}
 
 
 def test_parts_that_are_seen_inside_each_other_touch() -> None:

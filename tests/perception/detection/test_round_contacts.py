@@ -28,11 +28,11 @@ def built(name: str) -> scenes.Scene:
 
 
 @pytest.mark.parametrize("name", sorted(SCENES))
-@pytest.mark.parametrize("level", [pytest.param(0.0, marks=pytest.mark.numeric), 0.5])
-def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
+@pytest.mark.parametrize("noise_level", [pytest.param(0.0, marks=pytest.mark.numeric), 0.5])
+def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float) -> None:
     scene = built(name)
     for seed in range(3):
-        recognised = recognise(seen_at(scene, seed, level, play_m=0.1e-3))
+        recognised = recognise(seen_at(scene, seed, noise_level, play_m=0.1e-3))
         assert contacts(recognised.assembly) == contacts(scene.assembly)
         assert tuple(e.contact for e in recognised.evidence) == tuple(
             r.contact for r in recognised.assembly.relations()

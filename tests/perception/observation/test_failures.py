@@ -10,10 +10,10 @@ from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.geometry import approximate_symmetries, pose
 from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models.failures import PRESETS, CameraFailures, make_failures
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 
-LEVEL = Level(1.0, 1.0)
+NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 
 
 @cache
@@ -25,7 +25,7 @@ def demonstration():
 
 def failures(kind, seed, **settings):
     shown = demonstration()
-    return make_failures(kind, LEVEL, **settings).draw_false(shown, np.random.default_rng(seed))
+    return make_failures(kind, NOISE_LEVEL, **settings).draw_false(shown, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize(("kind", "low", "high"), [("flips", 0.25, 0.35), ("stale", 0.25, 0.35), ("rays", 0.25, 0.35)])
@@ -63,7 +63,7 @@ def test_swaps_exchange_two_views_of_like_parts():
 
 def test_an_error_along_the_ray_is_on_it():
     shown = demonstration()
-    model = make_failures("rays", LEVEL, rate=1.0)
+    model = make_failures("rays", NOISE_LEVEL, rate=1.0)
     off = failures("rays", 3, rate=1.0).goals[:, :3, 3] - shown.goals[:, :3, 3]
     length = np.linalg.norm(off, axis=1)
     assert ((length >= 0.02) & (length <= 0.06)).all()
@@ -81,7 +81,7 @@ def test_a_displaced_view_has_one_displacement():
 def test_a_mixture_fails_in_several_ways():
     shown = demonstration()
     flips, rays = (PRESETS[name]._replace(rate=0.2) for name in ("flips", "rays"))
-    mixed = CameraFailures(LEVEL, (flips, rays))
+    mixed = CameraFailures(NOISE_LEVEL, (flips, rays))
     seen = [mixed.draw_false(shown, np.random.default_rng(seed)) for seed in range(300)]
     turned = [np.abs(views.goals - shown.goals)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
     shifted = [np.abs(views.goals - shown.goals)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
@@ -96,7 +96,7 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
     shown = demonstration()
     repeated = []
     for seed in range(300):
-        model = make_failures("rays", LEVEL, repeat=repeat)
+        model = make_failures("rays", NOISE_LEVEL, repeat=repeat)
         first = model.draw_false(shown, np.random.default_rng(seed))
         look = Looks(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
         seen = look(range(5))
@@ -106,9 +106,9 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
 
 
 def test_rates_may_follow_the_name():
-    noise = make_noise("flips:p=0.1/r=0.5", LEVEL)
+    noise = make_noise("flips:p=0.1/r=0.5", NOISE_LEVEL)
     assert (noise.failures, noise.repeat) == ((PRESETS["flips"]._replace(rate=0.1),), 0.5)
-    assert make_noise("stale:r=0.5", LEVEL).failures == make_noise("stale", LEVEL).failures
+    assert make_noise("stale:r=0.5", NOISE_LEVEL).failures == make_noise("stale", NOISE_LEVEL).failures
     stated = observe(demonstration(), "flips:p=0.1/r=0.5", np.random.default_rng(1)).outliers
     assert (stated.gross, stated.repeat) == pytest.approx((0.1, 0.5))
 
@@ -116,10 +116,10 @@ def test_rates_may_follow_the_name():
 @pytest.mark.parametrize("given", ["flips:0.1", "flips:q=0.1", "flips:p=0.1/p=0.2"])
 def test_rates_that_are_none_are_refused(given):
     with pytest.raises(InputError, match=rf"'{given}' was given; state how often the camera fails, 'flips:p=0\.1'"):
-        make_noise(given, LEVEL)
+        make_noise(given, NOISE_LEVEL)
 
 
 @pytest.mark.parametrize("given", ["flips:p=nan", "flips:r=-0.1"])
 def test_rates_that_make_no_sense_are_refused(given):
     with pytest.raises(InputError, match="give a number from 0 to 1"):
-        make_noise(given, LEVEL)
+        make_noise(given, NOISE_LEVEL)

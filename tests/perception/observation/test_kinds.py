@@ -24,10 +24,10 @@ from apo_bench.perception.observation.models.outliers import (
 from apo_bench.perception.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
 from apo_bench.perception.observation.models.sighted import Sighted, line_of_sight
 from apo_bench.perception.observation.models.symmetric import WORSE, AnyTurn, Symmetric
-from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from tests import scenes
 
-LEVEL = Level(2.0, 2.0)
+NOISE_LEVEL = NoiseLevel(2.0, 2.0)
 CYCLE = scenes.turned(scenes.subassembly_on_castles(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
 CUBE_TWICE = [2, 4]
 """The operations that move the cube."""
@@ -77,7 +77,7 @@ def test_on_the_optical_axis_and_behind_the_camera_frames_are_still_rotations(al
 def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     """Positions that were seen, in the frames of the true rays: what the twist does to them is not used."""
     camera = Camera(pose.at((0.5, -0.4, 0.6), (-140.0, 10.0, 50.0)))
-    noise = Sighted(Level(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
+    noise = Sighted(NoiseLevel(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
     offsets = []
     turns = []
     for seed in range(600):
@@ -93,7 +93,7 @@ def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
 
 def test_what_a_camera_states_follows_from_what_it_saw() -> None:
     """From seen poses alone, so a corrector cannot read the true ray off the covariance."""
-    noise = Sighted(LEVEL)
+    noise = Sighted(NOISE_LEVEL)
     seen = see(noise, 1)
     sigma = np.array([2e-3 * noise.across] * 2 + [2e-3 * noise.along])
     turn = np.radians(2.0) * np.array([noise.tilt, noise.tilt, noise.about])
@@ -107,10 +107,10 @@ def test_heavy_tails_are_those_of_student() -> None:
     from scipy.stats import f, kstest
 
     sigma = np.repeat([2e-3, np.radians(2.0)], 3)
-    xi = np.concatenate([twists(see(HeavyTailed(LEVEL), seed)) for seed in range(300)])
+    xi = np.concatenate([twists(see(HeavyTailed(NOISE_LEVEL), seed)) for seed in range(300)])
     squared = np.sum((xi / sigma) ** 2, axis=1) / 6 * FREEDOM / (FREEDOM - 2)
     assert kstest(squared, f(6, FREEDOM).cdf).pvalue > 1e-3
-    gaussian = np.concatenate([twists(see(HeavyTailed(LEVEL, freedom=1e6), seed)) for seed in range(300)])
+    gaussian = np.concatenate([twists(see(HeavyTailed(NOISE_LEVEL, freedom=1e6), seed)) for seed in range(300)])
     assert kstest(np.sum((gaussian / sigma) ** 2, axis=1) / 6, f(6, FREEDOM).cdf).pvalue < 1e-6
 
 
@@ -122,7 +122,7 @@ def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
     gross = []
     seen = []
     for seed in range(trials):
-        made = see(Outliers(LEVEL), seed)
+        made = see(Outliers(NOISE_LEVEL), seed)
         rng = np.random.default_rng(seed)
         rng.standard_normal((5, 6))
         gross.append(rng.random((5, 2))[:, 0] < OUTLIERS)
@@ -142,32 +142,32 @@ def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
 
 
 def test_how_often_there_are_outliers_is_stated() -> None:
-    stated = see(Outliers(Level(1.0, 1.0), outliers=0.2, times=8.0), 0).outliers
+    stated = see(Outliers(NoiseLevel(1.0, 1.0), outliers=0.2, times=8.0), 0).outliers
     assert stated is not None
     assert (stated.broad, stated.times) == (0.2, 8.0)
     assert stated.gross == 1e-3  # the least rate that is ever stated
-    assert see(Outliers(Level(1.0, 1.0), times=1.0), 0).outliers is None
-    assert see(Isotropic(LEVEL), 0).outliers is None
+    assert see(Outliers(NoiseLevel(1.0, 1.0), times=1.0), 0).outliers is None
+    assert see(Isotropic(NOISE_LEVEL), 0).outliers is None
 
 
 def test_inliers_have_the_stated_covariance_and_all_errors_the_declared_one() -> None:
     unit, gross, seen = outlying()
-    stated = see(Outliers(LEVEL, misses=0.0), 0).covariance
+    stated = see(Outliers(NOISE_LEVEL, misses=0.0), 0).covariance
     assert_allclose(stated, np.tile(np.diag(np.repeat([2e-3, np.radians(2.0)], 3) ** 2), (5, 1, 1)), rtol=1e-12)
     inliers = unit[seen & ~gross]
     assert_allclose(inliers.T @ inliers / len(inliers), np.eye(6), atol=5 * np.sqrt(2 / len(inliers)))
-    assert np.mean(unit[seen] ** 2) / Outliers(LEVEL).inflation == pytest.approx(1.0, abs=0.12)
-    assert Outliers(LEVEL).inflation == pytest.approx(10.9)
+    assert np.mean(unit[seen] ** 2) / Outliers(NOISE_LEVEL).inflation == pytest.approx(1.0, abs=0.12)
+    assert Outliers(NOISE_LEVEL).inflation == pytest.approx(10.9)
 
 
 def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     """Move what is missed elsewhere: the observation stays the same, to the bit."""
-    seed = next(s for s in range(200) if not see(Outliers(LEVEL), s).seen.all())
-    here = see(Outliers(LEVEL), seed)
+    seed = next(s for s in range(200) if not see(Outliers(NOISE_LEVEL), s).seen.all())
+    here = see(Outliers(NOISE_LEVEL), seed)
     k = int(np.argmin(here.seen))
     goals = CYCLE.goals.copy()
     goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
-    there = see(Outliers(LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
+    there = see(Outliers(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.goals.tobytes() == there.goals.tobytes()
     assert_array_equal(here.covariance, there.covariance)
     assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
@@ -186,16 +186,16 @@ def test_what_was_missed_stays_where_its_part_was_seen_last() -> None:
 
 def test_the_same_operations_are_missed_at_every_level_but_zero() -> None:
     for seed in range(60):
-        masks = [see(Outliers(Level(mm, mm)), seed).seen for mm in (0.1, 1.0, 4.0)]
+        masks = [see(Outliers(NoiseLevel(mm, mm)), seed).seen for mm in (0.1, 1.0, 4.0)]
         assert_array_equal(masks[0], masks[1])
         assert_array_equal(masks[0], masks[2])
-        assert see(Outliers(Level(0.0, 0.0), misses=1.0), seed).seen.all()
+        assert see(Outliers(NoiseLevel(0.0, 0.0), misses=1.0), seed).seen.all()
 
 
 def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shared, "OWN", 0.0)
     for seed in range(20):
-        xi = twists(see(Bias(LEVEL), seed))
+        xi = twists(see(Bias(NOISE_LEVEL), seed))
         assert_allclose(xi[CUBE_TWICE[0]], xi[CUBE_TWICE[1]], atol=1e-12)
         assert np.abs(xi[0] - xi[1]).max() > 1e-5
 
@@ -205,7 +205,7 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
     monkeypatch.setattr(shared, "OWN", 0.0)
     size = []
     for seed in range(400):
-        seen = see(BiasView(LEVEL), seed)
+        seen = see(BiasView(NOISE_LEVEL), seed)
         E = seen.goals @ pose.inverse(CYCLE.goals)
         middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
         assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
@@ -219,7 +219,7 @@ def test_errors_drift_from_operation_to_operation() -> None:
     A = Camera().T_world_camera[:3, :3]
     world = []
     for seed in range(800):
-        seen = see(Correlated(LEVEL), seed)
+        seen = see(Correlated(NOISE_LEVEL), seed)
         xi = twists(seen)
         R = seen.goals[:, :3, :3]
         world.append(np.concatenate([np.einsum("nij,nj->ni", R, half) @ A for half in (xi[:, :3], xi[:, 3:])], axis=1))
@@ -235,7 +235,7 @@ def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
     """Errors about the centre of volume: castles like isotropic ones, cube and stick worse about x alone."""
     centred = []
     for seed in range(800):
-        xi = twists(see(Symmetric(LEVEL), seed))
+        xi = twists(see(Symmetric(NOISE_LEVEL), seed))
         solids = [CYCLE.assembly.solids[o.main] for o in CYCLE.assembly.operations]
         to = np.array([pose.adjoint(pose.inverse(pose.at(solid.centroid))) for solid in solids])
         centred.append((to @ xi[..., None])[..., 0])
@@ -250,7 +250,7 @@ def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_er
     turns = []
     stated = []
     for seed in range(300):
-        seen = see(Symmetric(Level(1.0, 40.0)), seed)
+        seen = see(Symmetric(NoiseLevel(1.0, 40.0)), seed)
         off = pose.inverse(CYCLE.goals) @ seen.goals
         for k, operation in enumerate(CYCLE.assembly.operations):
             equal = off[k] @ symmetries(CYCLE.assembly.solids[operation.main])
@@ -270,7 +270,7 @@ def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated()
     shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
     lengths = []
     for seed in range(300):
-        seen = Symmetric(LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
+        seen = Symmetric(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.goals) @ layout.goals)
         lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
     assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)
@@ -280,8 +280,8 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
     """It differs from `symmetric` by symmetries of the parts alone, and every one of them occurs."""
     turns = set()
     for seed in range(120):
-        near = see(Symmetric(LEVEL), seed)
-        far = see(AnyTurn(LEVEL), seed)
+        near = see(Symmetric(NOISE_LEVEL), seed)
+        far = see(AnyTurn(NOISE_LEVEL), seed)
         for k, operation in enumerate(CYCLE.assembly.operations):
             group = symmetries(CYCLE.assembly.solids[operation.main])
             off = np.abs(group - pose.inverse(near.goals[k]) @ far.goals[k]).max(axis=(1, 2))
@@ -301,10 +301,10 @@ def test_a_camera_is_rigid() -> None:
 def test_a_demonstration_without_operations_is_seen_as_one(name: str) -> None:
     empty = scenes.scene([scenes.table()], [], np.zeros((0, 4, 4)))
     demonstration = Demonstration(empty.assembly, empty.start, empty.goals, empty.start, np.zeros((0, 6, 6)))
-    assert observe(demonstration, make_noise(name, LEVEL), np.random.default_rng(0)).goals.shape == (0, 4, 4)
+    assert observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0)).goals.shape == (0, 4, 4)
 
 
 def test_everything_missed_is_an_observation_too() -> None:
-    seen = see(Outliers(LEVEL, misses=1.0), 0)
+    seen = see(Outliers(NOISE_LEVEL, misses=1.0), 0)
     assert not seen.seen.any()
     assert np.isfinite(seen.goals).all()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench import Demonstration, Layout, Observation, Scene, TrialSettings, draw_layout, load_scenario, observe
+from apo_bench import Demonstration, Layout, Observation, Scene, TrialConfig, draw_layout, load_scenario, observe
 from apo_bench.assembly import placements
 from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
@@ -20,7 +20,7 @@ from apo_bench.perception.observation.models import sighted
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.isotropic import Isotropic
-from apo_bench.perception.observation.noise import FAILURES, NOISES, Level, Noise, make_noise
+from apo_bench.perception.observation.noise import FAILURES, NOISES, Noise, NoiseLevel, make_noise
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream
@@ -29,7 +29,7 @@ from tests import scenes
 NAMES = sorted(NOISES)
 STEADY = sorted({*NOISES} - {*FAILURES})
 """Those whose errors all have what is stated; failures have laws of their own, in test_failures.py."""
-LEVEL = Level(2.0, 2.0)
+NOISE_LEVEL = NoiseLevel(2.0, 2.0)
 CYCLE = scenes.turned(scenes.subassembly_on_castles(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 """Five operations: castles with their origin off the centre, a cube that is moved twice, a stick."""
 TRIALS = 700
@@ -82,7 +82,7 @@ def mismatch(draws: Draws, inflation: float = 1.0) -> float:
 @pytest.mark.parametrize("name", STEADY)
 def test_errors_have_zero_mean_and_the_covariance_that_is_declared(name: str) -> None:
     """Over seeds. `inflation` is what a model declares beyond what its observations state: gross outliers."""
-    noise = make_noise(name, LEVEL)
+    noise = make_noise(name, NOISE_LEVEL)
     draws = drawn(noise)
     assert bias(draws) < BOUND
     assert mismatch(draws, getattr(noise, "inflation", 1.0)) < BOUND
@@ -97,7 +97,7 @@ class Cheat:
     skew: float = 0.0
 
     def __call__(self, assembly: Any, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        seen = Isotropic(LEVEL)(assembly, shown, rng)
+        seen = Isotropic(NOISE_LEVEL)(assembly, shown, rng)
         sigma = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))
         unit = pose.log(pose.inverse(shown.goals) @ seen.goals) / sigma
         unit = self.factor * unit + self.offset * np.eye(6)[4] + self.skew * np.roll(unit, 1, axis=1)
@@ -125,7 +125,7 @@ def test_the_law_would_notice(cheat: Noise, check: Callable[[Draws], float]) -> 
 
 def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pytest.MonkeyPatch) -> Observation:
     """What is seen where the scene and the camera are turned together, with the same chance."""
-    noise: Any = make_noise(name, LEVEL)
+    noise: Any = make_noise(name, NOISE_LEVEL)
     rng: Any = np.random.default_rng(3)
     if hasattr(noise, "camera"):
         noise = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
@@ -145,7 +145,7 @@ def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pyte
 @pytest.mark.parametrize("name", NAMES)
 def test_the_choice_of_the_world_frame_does_not_count(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scene and camera turned by W: the goals turn with them, and what is stated in the frames of parts stays."""
-    here = observe(scenes.shown(CYCLE), make_noise(name, LEVEL), np.random.default_rng(3))
+    here = observe(scenes.shown(CYCLE), make_noise(name, NOISE_LEVEL), np.random.default_rng(3))
     for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
         with monkeypatch.context() as patch:
             there = in_another_world(CYCLE, name, W, patch)
@@ -161,7 +161,7 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
     after = set()
     for factor in (1.0, 4.0):
         rng = np.random.default_rng(2)
-        seen.append(observe(scenes.shown(CYCLE), make_noise(name, Level(0.5 * factor, 0.75 * factor)), rng))
+        seen.append(observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.5 * factor, 0.75 * factor)), rng))
         after.add(rng.random())
     weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.goals) for observation in seen)
     assert_array_equal(seen[0].seen, seen[1].seen)
@@ -178,7 +178,7 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
     for seed in range(40):
-        seen = observe(scenes.shown(CYCLE), make_noise(name, Level(0.0, 0.0)), np.random.default_rng(seed))
+        seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.0, 0.0)), np.random.default_rng(seed))
         assert seen.goals.tobytes() == CYCLE.goals.tobytes()
         assert seen.seen.all()
         assert_allclose(seen.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
@@ -187,7 +187,7 @@ def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None:
     def made(seed: int) -> bytes:
-        seen = observe(scenes.shown(CYCLE), make_noise(name, LEVEL), np.random.default_rng(seed))
+        seen = observe(scenes.shown(CYCLE), make_noise(name, NOISE_LEVEL), np.random.default_rng(seed))
         return seen.goals.tobytes() + seen.covariance.tobytes() + seen.seen.tobytes()
 
     assert made(1) == made(1)
@@ -196,15 +196,16 @@ def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None
 
 @pytest.mark.parametrize("name", NAMES)
 def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
-    careless = np.zeros((5, 6, 6))
-    careless[1, 1, 1] = 0.0029**2
-    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, careless))
+    human_error_scale = np.zeros((5, 6, 6))
+    human_error_scale[1, 1, 1] = 0.0029**2
+    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, human_error_scale))
     plain, loose = (
-        observe(demonstration, make_noise(name, LEVEL), np.random.default_rng(0)) for demonstration in demonstrations
+        observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0))
+        for demonstration in demonstrations
     )
     assert_array_equal(loose.goals, plain.goals)
     assert plain.seen[1]
-    assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-17)
+    assert_allclose(loose.covariance - plain.covariance, human_error_scale, atol=1e-17)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -229,11 +230,11 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(trial, "replay_and_judge", refuse)
     monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
-    monkeypatch.setattr(trial, "promised_success", lambda *_: 1.0)  # so does this
-    spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
+    monkeypatch.setattr(trial, "predict_success", lambda *_: 1.0)  # so does this
+    spec = TrialConfig("carried_bridge", noise_mm=1.5, noise_deg=0.5, noise=name, method="uncorrected", seed=5)
     with pytest.raises(Carried):
         trial.run_trial(spec, scene, simulated=simulated, content="any")
-    expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
+    expected = make_noise(name, NoiseLevel(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
     assert expected.seen.all()
     assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
     assert carried_out[0].targets.tobytes() == expected.goals.tobytes()
@@ -245,8 +246,8 @@ def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
     simulated = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
     for seed in range(40):
-        seen = observe_demonstration(simulated, make_noise(name, LEVEL), seed)
-        planned = apply_method("none", seen, CYCLE.goals)
+        seen = observe_demonstration(simulated, make_noise(name, NOISE_LEVEL), seed)
+        planned = apply_method("uncorrected", seen, CYCLE.goals)
         if seen.seen.all():
             assert planned.plan is not None
             assert planned.plan.goals.tobytes() == seen.goals.tobytes()
@@ -263,7 +264,7 @@ def test_large_errors_stay_within_the_observations_of_the_environment(name: str)
     """At level 40; positions of gross outliers are given at the wall of the room."""
     widest = np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)
     for seed in range(60):
-        seen = observe(scenes.shown(CYCLE), make_noise(name, Level(40.0, 40.0)), np.random.default_rng(seed))
+        seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(40.0, 40.0)), np.random.default_rng(seed))
         assert (np.abs(seen.covariance) <= widest).all()
         goals = packed(seen.goals)
         assert np.abs(goals[:, :3]).max() <= ROOM_M

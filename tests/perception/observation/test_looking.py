@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.perception.observation.looking import Looks
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 
 N = 5
 
@@ -20,7 +20,7 @@ def demonstration():
 
 
 def looks(allowed, noise="isotropic", assembly=None):
-    model = make_noise(noise, Level(1.0, 1.0))
+    model = make_noise(noise, NoiseLevel(1.0, 1.0))
     return Looks(demonstration(), model, np.random.default_rng(7), allowed, assembly)
 
 
@@ -28,10 +28,10 @@ def test_what_was_not_asked_for_is_not_seen():
     look = looks(2)
     seen = look((3, 0, 3))
     assert seen.seen.tolist() == [True, False, False, True, False]
-    assert (look.left, look.seen_again) == (1, 2)
+    assert (look.left, look.reobservations) == (1, 2)
     assert (seen.play_m, seen.assembly) == (2e-4, demonstration().assembly)
     assert look([4]).seen.tolist() == [False, False, False, False, True]
-    assert (look.left, look.seen_again) == (0, 3)
+    assert (look.left, look.reobservations) == (0, 3)
 
 
 def test_a_look_does_not_depend_on_what_was_asked_before():

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from apo_bench import InputError, Observation, TrialSettings, observe
+from apo_bench import InputError, Observation, TrialConfig, observe
 from apo_bench.cli.app import main
 from apo_bench.envs.spaces import LARGEST_DEVIATION
 from apo_bench.formats.bop import read_results
@@ -24,9 +24,9 @@ from apo_bench.perception.observation.models.empirical import Empirical, read_re
 from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, ConstantError, Fitted, ViewNoise, restated
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.fingerprint import config_hash
 from apo_bench.trial.inputs import noise_content
 from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of
@@ -34,7 +34,7 @@ from tests import scenes
 from tests.bop_made import Known
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
-LEVEL = Level(0.8, 0.6)
+NOISE_LEVEL = NoiseLevel(0.8, 0.6)
 DRAWS = 1200
 BOUND = 5.0
 """Observations behind a law, three operations each, and how many standard errors off a mean may be."""
@@ -72,13 +72,13 @@ def names(request: pytest.FixtureRequest, folder: Path) -> tuple[str, str]:
     return request.param, f"{request.param}-inliers"
 
 
-def see(name: str, seed: int, level: Level = LEVEL) -> Observation:
-    return observe(scenes.shown(TOWER), make_noise(name, level), np.random.default_rng(seed))
+def see(name: str, seed: int, noise_level: NoiseLevel = NOISE_LEVEL) -> Observation:
+    return observe(scenes.shown(TOWER), make_noise(name, noise_level), np.random.default_rng(seed))
 
 
 def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     """Body twists in units of what was stated, (draws, n, 6), and which were seen, (draws, n)."""
-    noise = make_noise(name, LEVEL)
+    noise = make_noise(name, NOISE_LEVEL)
     demonstration = scenes.shown(TOWER)
     seen = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(draws)]
     xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.goals for observation in seen]))
@@ -100,7 +100,7 @@ def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> No
 
 def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names: tuple[str, str]) -> None:
     unit, there = whitened(names[0], 800)
-    noise = make_noise(names[0], LEVEL)
+    noise = make_noise(names[0], NOISE_LEVEL)
     if isinstance(noise, Fitted):
         missed = noise.measured.missed
         outliers = noise.measured.outliers
@@ -120,7 +120,7 @@ def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names:
 
 
 def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) -> None:
-    noise = make_noise(names[0], LEVEL)
+    noise = make_noise(names[0], NOISE_LEVEL)
     assert isinstance(noise, Fitted | Empirical)
     here = observe(scenes.shown(TOWER), noise, np.random.default_rng(3))
     for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
@@ -136,9 +136,9 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
     for seed in range(20):
         seen = []
         after = set()
-        for level in (Level(0.2, 0.1), Level(0.8, 0.2)):
+        for noise_level in (NoiseLevel(0.2, 0.1), NoiseLevel(0.8, 0.2)):
             rng = np.random.default_rng(seed)
-            seen.append(observe(scenes.shown(TOWER), make_noise(names[0], level), rng))
+            seen.append(observe(scenes.shown(TOWER), make_noise(names[0], noise_level), rng))
             after.add(rng.random())
         assert len(after) == 1
         assert_array_equal(seen[0].seen, seen[1].seen)
@@ -148,7 +148,7 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
         lengths = [np.linalg.norm(xi[:, :3], axis=1) for xi in (weak, strong)]
         assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
         assert_allclose(strong[:, 3:], 2.0 * weak[:, 3:], rtol=1e-6, atol=1e-12)
-        none = see(names[0], seed, Level(0.0, 0.0))
+        none = see(names[0], seed, NoiseLevel(0.0, 0.0))
         assert none.goals.tobytes() == TOWER.goals.tobytes()
         assert none.seen.all()
         assert_allclose(none.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
@@ -156,11 +156,11 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
 
 def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
     """What is stated stays within the observations of the environment."""
-    for level, unit in ((Level(900.0, 0.0), "mm"), (Level(0.0, 900.0), "degrees")):
+    for noise_level, unit in ((NoiseLevel(900.0, 0.0), "mm"), (NoiseLevel(0.0, 900.0), "degrees")):
         with pytest.raises(InputError, match=rf"a level of 900 {unit} .*; at most \d") as raised:
-            make_noise(names[0], level)
+            make_noise(names[0], noise_level)
         most = float(str(raised.value).split("at most ")[1].split()[0])
-        seen = see(names[1], 0, Level(*(min(x, most) for x in level)))
+        seen = see(names[1], 0, NoiseLevel(*(min(x, most) for x in noise_level)))
         assert (np.abs(seen.covariance) <= np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)).all()
         assert np.sqrt(seen.covariance.max()) > 0.7 * (0.4 if unit == "mm" else 2.0)
 
@@ -168,7 +168,7 @@ def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
 def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
     for seed in range(30):
         seen = see(names[0], seed)
-        planned = apply_method("none", seen, TOWER.goals)
+        planned = apply_method("uncorrected", seen, TOWER.goals)
         assert (planned.plan is not None) == bool(seen.seen.all())
         if planned.plan is not None:
             assert planned.plan.goals.tobytes() == seen.goals.tobytes()
@@ -178,7 +178,7 @@ def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]
 
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
     """Its pose is the one at which the part started or was seen last, and what is stated says that it is not known."""
-    noise = make_noise(names[0], LEVEL)
+    noise = make_noise(names[0], NOISE_LEVEL)
     demonstration = scenes.shown(TOWER)
     missed = 0
     for seed in range(60):
@@ -198,7 +198,7 @@ def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
     camera = Camera()
     found = []
     for seed in range(60):
-        seen = see(f"empirical:{folder / 'whole.csv'}", seed, Level(1.0, 1.0))
+        seen = see(f"empirical:{folder / 'whole.csv'}", seed, NoiseLevel(1.0, 1.0))
         F = camera.frames(TOWER.goals)
         shift = np.einsum("nji,nj->ni", F, seen.goals[:, :3, 3] - TOWER.goals[:, :3, 3]) * 1e3
         R = seen.goals[:, :3, :3] @ np.swapaxes(TOWER.goals[:, :3, :3], 1, 2)
@@ -239,7 +239,7 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
     for i, source in enumerate(("whole", "inliers")):
         path.write_bytes((folder / f"{source}.csv").read_bytes())
         os.utime(path, ns=(i, i))
-        hashed = spec_hash(TrialSettings("stick_in_tower", noise=name), "content")
+        hashed = config_hash(TrialConfig("stick_in_tower", noise=name), "content")
         seen.append((see(name, 0).goals.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
     assert all(first != second for first, second in zip(*seen, strict=True))
     assert noise_content("isotropic", "anisotropic", "package.module:name") == {}
@@ -249,7 +249,7 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     path = tmp_path / "mine.toml"
     measured, camera = read_noise(presets()["megapose-lmo"])
     path.write_text(noise_text(measured, ("a note",)) + "\n[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
-    noise = make_noise(str(path), LEVEL)
+    noise = make_noise(str(path), NOISE_LEVEL)
     assert isinstance(noise, Fitted)
     assert noise.measured == measured
     assert_allclose(noise.camera.T_world_camera, pose.at((0, 0, 1.5), (180, 0, 0)))
@@ -312,7 +312,7 @@ def test_bad_noise_files_are_refused(
     path = tmp_path / "noise.toml"
     path.write_text(GOOD.replace(before, after, 1), encoding="utf-8")
     with pytest.raises(InputError, match=message) as raised:
-        make_noise(str(path), LEVEL)
+        make_noise(str(path), NOISE_LEVEL)
     assert str(path) in str(raised.value)
     assert main(["noise", "card", str(path)]) == 2
     assert capsys.readouterr().err == f"apo-bench: {raised.value}\n"
@@ -334,11 +334,11 @@ def test_bad_residuals_are_refused(line: str, message: str, folder: Path, tmp_pa
     header = (folder / "whole.csv").read_text(encoding="utf-8").splitlines()[0]
     path.write_text(f"{header}\n{line}\n", encoding="utf-8")
     with pytest.raises(InputError, match=message) as raised:
-        make_noise(f"empirical:{path}", LEVEL)
+        make_noise(f"empirical:{path}", NOISE_LEVEL)
     assert str(path) in str(raised.value)
 
 
 def test_files_that_are_not_there(tmp_path: Path) -> None:
     for name in (f"{tmp_path}/no.toml", f"empirical:{tmp_path}/no.csv", f"empirical:{tmp_path}", "empirical:"):
         with pytest.raises(InputError, match=r"cannot be read|a folder was given|a file is needed"):
-            make_noise(name, LEVEL)
+            make_noise(name, NOISE_LEVEL)

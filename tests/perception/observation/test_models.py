@@ -23,11 +23,11 @@ from apo_bench.perception.observation.models.sighted import (
     Anisotropic,
     line_of_sight,
 )
-from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from tests import scenes
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
-LEVEL = Level(3.0, 6.0)
+NOISE_LEVEL = NoiseLevel(3.0, 6.0)
 
 
 def see(noise: Noise, seed: int) -> Observation:
@@ -44,7 +44,7 @@ def test_draws_differ_along_the_sight_and_across_it() -> None:
     sight = line_of_sight()
     world = []
     for seed in range(1000):
-        seen = see(Anisotropic(LEVEL), seed)
+        seen = see(Anisotropic(NOISE_LEVEL), seed)
         R = seen.goals[:, :3, :3]
         xi = twists(seen, TOWER.goals)
         world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
@@ -63,7 +63,7 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
     turned = scenes.turned(TOWER, pose.at((0.3, 0.1, 0.0), (15.0, -40.0, 100.0)))
     worlds = []
     for scene in (TOWER, turned):
-        seen = observe(scenes.shown(scene), Anisotropic(LEVEL), np.random.default_rng(4))
+        seen = observe(scenes.shown(scene), Anisotropic(NOISE_LEVEL), np.random.default_rng(4))
         R = np.zeros((len(seen.goals), 6, 6))
         R[:, :3, :3] = R[:, 3:, 3:] = seen.goals[:, :3, :3]
         worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
@@ -73,7 +73,7 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
 
 def test_the_geometric_mean_is_that_of_isotropic() -> None:
     """Determinants: 0.91 of the level for positions, the level itself for turns."""
-    seen = see(Anisotropic(LEVEL), 0)
+    seen = see(Anisotropic(NOISE_LEVEL), 0)
     for half, expected in (
         (slice(0, 3), (ALONG_SIGHT * ACROSS_SIGHT**2) ** (1 / 3) * 3e-3),
         (slice(3, 6), np.radians(6.0)),
@@ -84,8 +84,8 @@ def test_the_geometric_mean_is_that_of_isotropic() -> None:
 
 def test_a_part_is_as_bad_in_every_operation() -> None:
     """The error of each operation is that of `isotropic` times the factor of the part it moves."""
-    plain = see(Isotropic(LEVEL), 8)
-    seen = see(PerPart(LEVEL), 8)
+    plain = see(Isotropic(NOISE_LEVEL), 8)
+    seen = see(PerPart(NOISE_LEVEL), 8)
     ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)
@@ -106,7 +106,7 @@ def test_factors_are_log_uniform() -> None:
 def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
     """Positions by the one, turns by the other, whatever frame they are drawn in."""
     sizes = []
-    for level in (Level(1.0, 0.5), Level(4.0, 1.0)):
-        xi = twists(see(make_noise(name, level), 2), TOWER.goals).reshape(3, 2, 3)
+    for noise_level in (NoiseLevel(1.0, 0.5), NoiseLevel(4.0, 1.0)):
+        xi = twists(see(make_noise(name, noise_level), 2), TOWER.goals).reshape(3, 2, 3)
         sizes.append(np.linalg.norm(xi, axis=2))
     assert_allclose(sizes[1] / sizes[0], np.tile([4.0, 2.0], (3, 1)), rtol=1e-6)

@@ -12,7 +12,7 @@ from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR, floored
 from apo_bench.perception.observation.models.isotropic import Isotropic
-from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -20,18 +20,18 @@ pytestmark = pytest.mark.numeric
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
 
 
-def errors(level: Level, draws: int) -> Array:
+def errors(noise_level: NoiseLevel, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
     rng = np.random.default_rng(11)
     demonstration = scenes.shown(TOWER)
-    seen = [Isotropic(level)(demonstration.assembly, demonstration, rng).goals for _ in range(draws)]
+    seen = [Isotropic(noise_level)(demonstration.assembly, demonstration, rng).goals for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 
 def test_errors_are_gaussian() -> None:
     from scipy.stats import kstest
 
-    unit = errors(Level(1.0, 1.0), 200) / np.repeat([1e-3, np.radians(1.0)], 3)
+    unit = errors(NoiseLevel(1.0, 1.0), 200) / np.repeat([1e-3, np.radians(1.0)], 3)
     assert kstest(unit.ravel(), "norm").pvalue > 1e-3
 
 
@@ -55,7 +55,7 @@ def test_what_is_above_the_floor_is_left_alone() -> None:
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
     shown = replace(scenes.shown(TOWER), gap_m=3e-4, play_m=2e-4)
-    seen = observe(shown, Isotropic(Level(1.0, 1.0)), np.random.default_rng(0))
+    seen = observe(shown, Isotropic(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
     assert seen.assembly is shown.assembly
     assert dict(seen.start).keys() == dict(shown.start).keys()
     assert seen.seen.tolist() == [True, True, True]
@@ -63,33 +63,35 @@ def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
 
 
 def test_make_noise_by_name_class_function_and_object() -> None:
-    level = Level(2.0, 1.0)
+    noise_level = NoiseLevel(2.0, 1.0)
     rng = np.random.default_rng(0)
 
     def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
         return scenes.seen(TOWER, shown.goals)
 
-    assert make_noise("isotropic", level) == Isotropic(level)
-    assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", level) == Isotropic(level)
-    assert make_noise(Isotropic, level) == Isotropic(level)
-    assert make_noise(Isotropic(Level(9.0, 9.0)), level) == Isotropic(Level(9.0, 9.0))
-    assert make_noise(plain, level) is plain
+    assert make_noise("isotropic", noise_level) == Isotropic(noise_level)
+    assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", noise_level) == Isotropic(
+        noise_level
+    )
+    assert make_noise(Isotropic, noise_level) == Isotropic(noise_level)
+    assert make_noise(Isotropic(NoiseLevel(9.0, 9.0)), noise_level) == Isotropic(NoiseLevel(9.0, 9.0))
+    assert make_noise(plain, noise_level) is plain
     assert_array_equal(observe(scenes.shown(TOWER), plain, rng).goals, TOWER.goals)
 
 
 @pytest.mark.parametrize(
-    ("given", "level", "message"),
+    ("given", "noise_level", "message"),
     [
-        ("isotropc", Level(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        ("here/mine.csv", Level(1, 1), "did you mean 'empirical:here/mine.csv'"),
-        ("isotropic", Level(1, float("nan")), "noise level nan degrees is not possible"),
-        (lambda goals: goals, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
-        (object, Level(1, 1), "the noise model 'object' failed"),
+        ("isotropc", NoiseLevel(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
+        ("here/mine.csv", NoiseLevel(1, 1), "did you mean 'empirical:here/mine.csv'"),
+        ("isotropic", NoiseLevel(1, float("nan")), "noise level nan degrees is not possible"),
+        (lambda goals: goals, NoiseLevel(1, 1), "cannot be called with (assembly, shown, rng)"),
+        (object, NoiseLevel(1, 1), "the noise model 'object' failed"),
     ],
 )
-def test_what_make_noise_refuses(given: object, level: Level, message: str) -> None:
+def test_what_make_noise_refuses(given: object, noise_level: NoiseLevel, message: str) -> None:
     with pytest.raises(InputError) as refused:
-        make_noise(given, level)
+        make_noise(given, noise_level)
     assert message in str(refused.value)
 
 

@@ -13,7 +13,7 @@ from apo_bench import InputError, observe
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
-from apo_bench.perception.observation.noise import NOISES, Level, make_noise
+from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.perception.observation.plain import Plain
 from apo_bench.viz.noise_card import Drawn, describe_model, draw_errors, find_facts, list_models, write_card
@@ -21,7 +21,7 @@ from tests import scenes
 
 TOWER = scenes.stick_in_tower()
 SHOWN = scenes.shown(TOWER)
-LEVEL = Level(1.0, 1.0)
+NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 
 
 def lifted(goals: Array, rng: np.random.Generator) -> Array:
@@ -42,7 +42,7 @@ def with_deviations(function, mm: object, deg: object):
 @pytest.mark.parametrize("wrap", [lambda: with_deviations(lifted, 2.0, 0.5), lambda: Plain(lifted, 2.0, 0.5)])
 def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
     before = TOWER.goals.copy()
-    seen = observe(SHOWN, make_noise(wrap(), LEVEL), np.random.default_rng(4))
+    seen = observe(SHOWN, make_noise(wrap(), NOISE_LEVEL), np.random.default_rng(4))
     up = np.random.default_rng(4).uniform(1e-3, 2e-3, 3)
     assert_allclose(seen.goals[:, 2, 3] - TOWER.goals[:, 2, 3], up, atol=1e-15)
     assert_allclose(seen.covariance, np.tile(np.diag(np.repeat([2e-3, np.radians(0.5)], 3) ** 2), (3, 1, 1)))
@@ -51,10 +51,10 @@ def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
 
 
 def test_what_is_declared_as_nothing_is_stated_as_the_floor_and_carelessness_is_added() -> None:
-    careless = np.zeros((3, 6, 6))
-    careless[1, 1, 1] = 0.003**2
-    model = make_noise(with_deviations(lambda goals, rng: goals, 0, 0), LEVEL)
-    seen = observe(scenes.shown(TOWER, careless), model, np.random.default_rng(0))
+    human_error_scale = np.zeros((3, 6, 6))
+    human_error_scale[1, 1, 1] = 0.003**2
+    model = make_noise(with_deviations(lambda goals, rng: goals, 0, 0), NOISE_LEVEL)
+    seen = observe(scenes.shown(TOWER, human_error_scale), model, np.random.default_rng(0))
     expected = np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1))
     expected[1, 1, 1] = 0.003**2
     assert_allclose(seen.covariance, expected, rtol=1e-9, atol=1e-20)
@@ -63,14 +63,14 @@ def test_what_is_declared_as_nothing_is_stated_as_the_floor_and_carelessness_is_
 
 def test_a_class_made_with_a_level_may_be_plain_too() -> None:
     class Mine:
-        def __init__(self, level: Level) -> None:
-            self.deviation_mm = 3 * level.mm
-            self.deviation_deg = level.deg
+        def __init__(self, noise_level: NoiseLevel) -> None:
+            self.deviation_mm = 3 * noise_level.mm
+            self.deviation_deg = noise_level.deg
 
         def __call__(self, goals: Array, rng: np.random.Generator) -> Array:
             return goals @ pose.exp(rng.standard_normal((len(goals), 6)) * self.deviation_mm * 1e-3)
 
-    seen = observe(SHOWN, make_noise(Mine, Level(2.0, 1.0)), np.random.default_rng(0))
+    seen = observe(SHOWN, make_noise(Mine, NoiseLevel(2.0, 1.0)), np.random.default_rng(0))
     assert_allclose(seen.covariance[0, 0, 0], 0.006**2)
 
 
@@ -84,7 +84,7 @@ def test_a_class_made_with_a_level_may_be_plain_too() -> None:
 )
 def test_declarations_that_are_missing_or_make_no_sense(given, message: str) -> None:
     with pytest.raises(InputError) as refused:
-        make_noise(given, LEVEL)
+        make_noise(given, NOISE_LEVEL)
     assert message in str(refused.value)
 
 
@@ -92,7 +92,7 @@ def test_one_declaration_alone_is_not_enough() -> None:
     half = with_deviations(lifted, 1.0, 1.0)
     del half.deviation_deg
     with pytest.raises(InputError, match=r"set noise\.deviation_deg, or give"):
-        make_noise(half, LEVEL)
+        make_noise(half, NOISE_LEVEL)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_one_declaration_alone_is_not_enough() -> None:
     ],
 )
 def test_what_a_plain_function_must_not_return(returned: object, message: str) -> None:
-    model = make_noise(with_deviations(lambda goals, rng: returned, 1.0, 1.0), LEVEL)
+    model = make_noise(with_deviations(lambda goals, rng: returned, 1.0, 1.0), NOISE_LEVEL)
     with pytest.raises(InputError, match="the noise model 'noise' ") as refused:
         observe(SHOWN, model, np.random.default_rng(0))
     assert message in str(refused.value)
@@ -138,7 +138,7 @@ def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.Ca
 
 
 def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["noise", "card", "camera", "--level", "2"]) == 0
+    assert main(["noise", "card", "camera", "--noise-level", "2"]) == 0
     text = capsys.readouterr().out
     about = find_facts("camera")
     assert text.startswith(f"# camera: {about.title}\n")
@@ -150,7 +150,7 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize("name", sorted([*NOISES, *presets()]))
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
     """Written by `python docs/noise.py`."""
-    page = (Path(__file__).parents[2] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
     where = "as measured" if name in presets() else "at 1 mm and 1 deg"
     assert f"{describe_model(name, 2)}\nErrors {where}, " in page
 
@@ -158,28 +158,32 @@ def test_the_page_of_cards_is_up_to_date(name: str) -> None:
 def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
     errors = np.zeros((5, 4))
     errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 7.0]
-    text = write_card("isotropic", LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
+    text = write_card("isotropic", NOISE_LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
     across = next(line for line in text.splitlines() if line.startswith("| across"))
     assert across.split("|")[2:5] == [f"{cell:>10} " for cell in ("3.61", "3", "2")]
     assert "5 operations of stick_in_tower; 25.0 % were not seen" in text
 
 
 @pytest.mark.parametrize(
-    ("given", "level", "words"),
+    ("given", "noise_level", "words"),
     [
-        ("flips:p=0.1", Level(2.0, 1.0), "Errors at 2 mm and 1 deg, 30 operations"),
-        ("megapose-lmo-inliers", LEVEL, "Errors as measured, 30 operations"),
-        ("megapose-lmo-inliers", Level(2.0, 0.5), "Errors 2 times in mm and 0.5 times in deg what was measured, 30"),
-        (Plain(lifted, 2.0, 0.5), Level(2.0, 2.0), "Errors at every level alike, 30 operations"),
+        ("flips:p=0.1", NoiseLevel(2.0, 1.0), "Errors at 2 mm and 1 deg, 30 operations"),
+        ("megapose-lmo-inliers", NOISE_LEVEL, "Errors as measured, 30 operations"),
+        (
+            "megapose-lmo-inliers",
+            NoiseLevel(2.0, 0.5),
+            "Errors 2 times in mm and 0.5 times in deg what was measured, 30",
+        ),
+        (Plain(lifted, 2.0, 0.5), NoiseLevel(2.0, 2.0), "Errors at every level alike, 30 operations"),
     ],
 )
-def test_a_card_says_what_its_level_means(given: object, level: Level, words: str) -> None:
-    assert f"\n{words}" in write_card(given, level, draw_errors(given, level, 10))
+def test_a_card_says_what_its_level_means(given: object, noise_level: NoiseLevel, words: str) -> None:
+    assert f"\n{words}" in write_card(given, noise_level, draw_errors(given, noise_level, 10))
 
 
 def test_no_level_reaches_a_plain_function() -> None:
-    for level in (Level(0.0, 0.0), Level(5.0, 5.0)):
-        seen = observe(SHOWN, make_noise(with_deviations(lifted, 2.0, 0.5), level), np.random.default_rng(4))
+    for noise_level in (NoiseLevel(0.0, 0.0), NoiseLevel(5.0, 5.0)):
+        seen = observe(SHOWN, make_noise(with_deviations(lifted, 2.0, 0.5), noise_level), np.random.default_rng(4))
         assert (seen.goals[:, 2, 3] > TOWER.goals[:, 2, 3] + 1e-3).all()
 
 
@@ -196,7 +200,7 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     ("arguments", "message"),
     [
         (["card", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        (["card", "isotropic", "--level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
+        (["card", "isotropic", "--noise-level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
         (["card", "megapose"], "did you mean 'megapose-lmo'"),
     ],
 )

@@ -128,8 +128,8 @@ def test_a_block_between_two_walls_comes_from_above_unless_told_otherwise() -> N
     assert (found.state.letter, macro.name, macro.direction.tolist()) == ("B", "insert-between", [0, 0, -1])
     assert macro.length_m == pytest.approx(0.05)
     assert (found.line.travel_m, found.free) == (pytest.approx(0.07), True)
-    (level,) = arrival(between(), Preference(X)).macros
-    assert (level.name, level.direction.tolist()) == ("insert-between", [1, 0, 0])
+    (noise_level,) = arrival(between(), Preference(X)).macros
+    assert (noise_level.name, noise_level.direction.tolist()) == ("insert-between", [1, 0, 0])
     through = arrival(between(), Preference(Y))
     assert through.macros[0].direction.tolist() == [0, 0, -1], "a line through a wall is not followed"
 

@@ -108,8 +108,8 @@ def test_contact_corrects_it(scenario: Scenario) -> None:
     rng = np.random.default_rng(3)
     layout = draw_layout(scenario, rng)
     final = placements(assembly, layout.start, layout.goals)[-1]
-    careless = np.zeros((len(assembly), 6, 6))
-    shown = Demonstration(assembly, layout.start, layout.goals, final, careless, play_m=2.5e-4)
+    human_error_scale = np.zeros((len(assembly), 6, 6))
+    shown = Demonstration(assembly, layout.start, layout.goals, final, human_error_scale, play_m=2.5e-4)
     seen = observe(shown, "isotropic", rng)
     correction = correct(seen, "contact")
     assert correction.status == "converged"

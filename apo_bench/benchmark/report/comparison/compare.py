@@ -12,13 +12,21 @@ from apo_bench.benchmark.report.trials import NUMBERS, verdict, why
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import grouped
-from apo_bench.records import KEY, SETTINGS, Key, row_key, with_salt
+from apo_bench.records import KEY, SETTINGS, Key, describe_secret_seed, record_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
 from apo_bench.records.run.trials import Mask, Trials, read_trials
 
 _ENDING = ("success", "failure_stage", "failure_code")
-_RESULT = (*_ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
+_RESULT = (
+    *_ENDING,
+    "as_demonstrated",
+    "loose_success",
+    "failure_operation",
+    "sentence",
+    "corrected_operations",
+    *NUMBERS,
+)
 
 
 class Side(NamedTuple):
@@ -70,10 +78,10 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     sides = [Side(Path(folder), read_run(Path(folder)), read_trials(folder)) for folder in (first, second)]
     for side in sides:
         require(len(side.trials), f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
-    salt, other_salt = (side.trials.find_salt() for side in sides)
+    secret_seed, other_seed = (side.trials.find_secret_seed() for side in sides)
     require(
-        salt == other_salt,
-        f"'{first}' was drawn {with_salt(salt)} and '{second}' {with_salt(other_salt)}, so that they have no "
+        secret_seed == other_seed,
+        f"'{first}' was drawn {describe_secret_seed(secret_seed)} and '{second}' {describe_secret_seed(other_seed)}, so that they have no "
         "trial in common, whatever their seeds; compare sweeps of one salt.",
     )
     ours, theirs = (_by_key(side) for side in sides)
@@ -119,7 +127,7 @@ def _settings_of(side: Side) -> dict[str, Any]:
         parts = {f"{name} {i}": x for i, x in enumerate(value, start=1)} if several else {name: value}
         for part, inner in parts.items():
             settings |= {f"{part}: {key}": x for key, x in inner.items()} if isinstance(inner, dict) else {part: inner}
-    shared = ("schema", *(info.column for info in SETTINGS.values() if info.shared))
+    shared = ("schema", *(info.name for info in SETTINGS.values() if info.shared))
     return settings | {f"rows: {name}": sorted(side.trials.distinct(name)) for name in shared}
 
 
@@ -127,7 +135,7 @@ def _by_key(side: Side) -> dict[Key, int]:
     """Key -> number of the trial."""
     index: dict[Key, int] = {}
     keys = zip(*(side.trials.values(name) for name in KEY), strict=True)
-    for i, (key, level) in enumerate(zip(keys, side.trials.values("level"), strict=True)):
+    for i, (key, level) in enumerate(zip(keys, side.trials.values("noise_mm"), strict=True)):
         require(
             key not in index,
             f"'{side.folder}' holds a trial twice ({', '.join(map(str, key))}); every trial counts once, so leave one "
@@ -200,7 +208,7 @@ def _changed(first: Side, second: Side) -> list[Line]:
     unlike = ~_same(first.trials, second.trials, ("success",))
     pairs = zip(first.trials.where(unlike).rows(), second.trials.where(unlike).rows(), strict=True)
     lines = [
-        dict(zip(KEY, row_key(x), strict=True))
+        dict(zip(KEY, record_key(x), strict=True))
         | {"place": _anywhere(place_of(x)), "first": _ended(x, first), "second": _ended(y, second)}
         for x, y in pairs
     ]

@@ -9,16 +9,16 @@ from apo_bench.benchmark.analysis import (
     Line,
     Paired,
     Place,
-    level_label,
     level_unit,
-    level_words,
     levels_of,
     members,
+    noise_label,
+    noise_words,
 )
 from apo_bench.benchmark.report.figures.bars import Shares, bar_figure
 from apo_bench.benchmark.report.figures.lines import Axes, Mark, line_figure
 from apo_bench.benchmark.report.figures.sheet import Figure
-from apo_bench.records import knows_truth, may_look
+from apo_bench.records import knows_truth, may_reobserve
 
 _FLOOR_MM = 1e-3
 """Gaps below this are drawn here: what solvers leave of zero says nothing."""
@@ -37,14 +37,14 @@ def figures(
     by_setting = members(settings, cells)
     level = _unit(settings)
     tightness = Axes("clearance per side over level [mm per mm]", "success", "percent")
-    looks = Axes("looks allowed after the first", "success", "percent")
+    max_reobservations = Axes("looks allowed after the first", "success", "percent")
     gap = ("Gap of the contacts as seen and as planned", _gaps(settings, gaps), Axes(level, "gap [mm]", "log"))
     lines = {
         "success_over_level": ("Success over level", _over_level(by_setting), Axes(level, "success", "percent")),
         "success_over_tightness": ("Success over tightness", _over_tightness(cells), tightness),
-        "success_over_looks": ("Success over the number of looks", _over_looks(cells), looks),
+        "success_over_looks": ("Success over the number of looks", _over_looks(cells), max_reobservations),
         "gap_before_and_after": gap,
-        "recognised": ("Recognised contacts", _recognised(recognitions), Axes("level", "share", "percent")),
+        "detected": ("Recognised contacts", _recognised(recognitions), Axes("noise_level", "share", "percent")),
         "timing": ("Wall time of a trial", _times(times), Axes("method", "wall time [s]")),
     }
     for reference in dict.fromkeys(p.reference for p in pairs):
@@ -67,11 +67,11 @@ def _over_level(by_setting: Mapping[Place, Sequence[Cell]]) -> list[Mark]:
     levels = {s: levels_of(own) for s, own in by_setting.items()}
     least = min(2, max(map(len, levels.values()), default=1))
     return [
-        Mark(_title(s, own), c.method, level, level_words(level, s.noise), c.rate, *c.interval)
+        Mark(_title(s, own), c.method, level, noise_words(level, s.noise), c.rate, *c.interval)
         for s, own in by_setting.items()
         for c in own
         if len(levels[s]) >= max(1, least) and c.rate is not None
-        for level in (levels[s] if knows_truth(c.method) else [(c.level, c.level_deg)])
+        for level in (levels[s] if knows_truth(c.method) else [(c.noise_mm, c.noise_deg)])
     ]
 
 
@@ -83,7 +83,7 @@ def _title(setting: Place, cells: Sequence[Cell]) -> str:
 
 def _differences(settings: Sequence[Place], pairs: Sequence[Paired]) -> list[Mark]:
     """A panel per setting in which methods are compared with a reference."""
-    here = members(settings, [p for p in pairs if p.place.method != "none"])
+    here = members(settings, [p for p in pairs if p.place.method != "uncorrected"])
     return [_mark(s, p.place, p.difference or 0.0, *p.interval) for s, own in here.items() for p in own]
 
 
@@ -104,10 +104,10 @@ def _recognised(lines: Sequence[Line]) -> list[Mark]:
     """Over all scenarios where there are several."""
     return [
         Mark(
-            f"{what}; {line['noise']}, carelessness {line['careless']:g}",
-            line["relations"],
-            (line["level"], line["level_deg"]),
-            level_label(line["level"], line["level_deg"], line["noise"]),
+            f"{what}; {line['noise']}, carelessness {line['human_error_scale']:g}",
+            line["contact_source"],
+            (line["noise_level"], line["noise_deg"]),
+            noise_label(line["noise_level"], line["noise_deg"], line["noise"]),
             *[line[what]] * 3,
         )
         for line in [line for line in lines if line["scenario"] == ALL] or lines
@@ -123,13 +123,13 @@ def _times(lines: Sequence[Line]) -> list[Mark]:
 
 def _over_looks(cells: Sequence[Cell]) -> list[Mark]:
     """What it is worth to look again, beside the methods that cannot ask for it, where several numbers were allowed."""
-    several = len({c.looks for c in cells if may_look(c.method)}) > 1
+    several = len({c.max_reobservations for c in cells if may_reobserve(c.method)}) > 1
     return [
         Mark(
-            c.setting._replace(looks=0).title,
-            f"{c.method}, {c.level_words}",
-            c.looks,
-            f"{c.looks}",
+            c.setting._replace(max_reobservations=0).title,
+            f"{c.method}, {c.noise_words}",
+            c.max_reobservations,
+            f"{c.max_reobservations}",
             c.rate,
             *c.interval,
         )
@@ -151,7 +151,7 @@ def _over_tightness(cells: Sequence[Cell]) -> list[Mark]:
 def _stages(by_setting: Mapping[Place, Sequence[Cell]]) -> dict[str, Shares]:
     """For every cell of a setting a bar of shares: success, then the stages that failed."""
     bars = {
-        s.title: {f"{c.method}, {c.level_words}": _endings(c) for c in own if c.trials} for s, own in by_setting.items()
+        s.title: {f"{c.method}, {c.noise_words}": _endings(c) for c in own if c.trials} for s, own in by_setting.items()
     }
     return {title: own for title, own in bars.items() if own}
 
@@ -177,8 +177,8 @@ def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
 
 def _mark(setting: Place, place: Place, value: float, low: float, high: float) -> Mark:
     """Of something at a level."""
-    level = (place.level, place.level_deg)
-    return Mark(setting.title, place.method, level, level_words(level, setting.noise), value, low, high)
+    level = (place.noise_mm, place.noise_deg)
+    return Mark(setting.title, place.method, level, noise_words(level, setting.noise), value, low, high)
 
 
 def _unit(settings: Iterable[Any]) -> str:

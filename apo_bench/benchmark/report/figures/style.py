@@ -28,16 +28,16 @@ class Style(NamedTuple):
 
 STYLES = {
     "oracle": Style(SOFT, "", _DASHED),
-    "none": Style("#d55e00", "o", _SOLID),
-    "search": Style("#e7298a", "8", _DASHED),
-    "by-heart": Style("#999933", (3, 1, 0), _DASHED),
+    "uncorrected": Style("#d55e00", "o", _SOLID),
+    "spiral-search": Style("#e7298a", "8", _DASHED),
+    "nominal": Style("#999933", (3, 1, 0), _DASHED),
     "contact": Style("#332288", "p", _SOLID),
     "contact-robust": Style("#aa3377", (4, 1, 0), _DASHED),
     "paper": Style("#0072b2", "s", _SOLID),
     "paper-track": Style("#009e73", "D", _SOLID),
     "snap": Style("#a6761d", "*", _DOTTED),
     "least-squares": Style("#117733", "<", _DOTTED),
-    "settle": Style("#882255", ">", _DOTTED),
+    "physics-settle": Style("#882255", ">", _DOTTED),
     "penalty": Style("#88ccee", "d", _DOTTED),
 }
 OWN_STYLES = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
@@ -90,7 +90,7 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
 
 
 @contextmanager
-def report_looks(salt: str) -> Iterator[None]:
+def report_looks(secret_seed: str) -> Iterator[None]:
     """Matplotlib's own settings but for these; one text as salt gives one file."""
-    with default_looks(_LOOKS | {"svg.hashsalt": salt}):
+    with default_looks(_LOOKS | {"svg.hashsalt": secret_seed}):
         yield

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Cell, Place, by_place, level_of, level_unit, level_words, levels_of
+from apo_bench.benchmark.analysis import Cell, Place, by_place, level_of, level_unit, levels_of, noise_words
 from apo_bench.benchmark.report.trials import NUMBERS, predicted, verdict, why
 from apo_bench.io import grouped
 from apo_bench.records import Limits, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.trials import Trials
 
-_DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_seconds": 1}
+_DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
 """Of numbers; of those in mm and degrees, and of others, three."""
 
 
@@ -58,7 +58,7 @@ def matrix(setting: Place, cells: Sequence[Cell], numbers: Mapping[Place, int]) 
             across = [Button(numbers[c.place], c, max(1, len(levels))) for c in own]
         lines.append((method, across))
     corner = f"method, {level_unit(setting.noise)}" if levels else "method"
-    return Matrix(setting.title, corner, [level_words(x, setting.noise) for x in levels] or ["any"], lines)
+    return Matrix(setting.title, corner, [noise_words(x, setting.noise) for x in levels] or ["any"], lines)
 
 
 def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[str, int]) -> str:
@@ -72,7 +72,7 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
         "verdict": verdict,
         "why": why,
         "sentence": lambda row: row["sentence"] or "",
-        "predicted": predicted,
+        "failure_prediction": predicted,
         "command": lambda row: without_seed(row, files, limits),
     }
     columns: dict[str, list[Any]] = {name: [] for name in ("seed", *words, *NUMBERS)}

@@ -75,7 +75,7 @@ def report_page(c: Contents) -> str:
         Section("felt", "What robots felt about themselves", _shown(c, (), "felt")),
         Section("effort", "What it takes", _shown(c, (), "effort")),
         Section("calibration", "Calibration", _shown(c, (), "calibration")),
-        Section("recognised", "Recognised contacts", _shown(c, ("recognised",), "recognised")),
+        Section("detected", "Recognised contacts", _shown(c, ("detected",), "detected")),
         Section("timing", "Timing", _shown(c, ("timing",), "times", "work")),
         Section("run", "What was run", _run(c)),
     ]
@@ -101,7 +101,7 @@ def _pictures(c: Contents) -> list[tuple[str, Any]]:
 def _picture(c: Contents, number: int) -> dict[str, str]:
     row, jpeg, words = c.pictures[number]
     place = place_of(row)
-    where = "" if place is None else f"{place.title}, level {place.level:g}, "
+    where = "" if place is None else f"{place.title}, level {place.noise_mm:g}, "
     return {
         "name": f"picture-{number}",
         "title": f"{row['method']}: {why(row)}.",
@@ -123,7 +123,7 @@ def _run(c: Contents) -> list[tuple[str, Any]]:
 
 def _scope(trials: Trials) -> str:
     """What was tried, and what was left out."""
-    names = ("scenario", "clearance_mm", "seed", "careless")
+    names = ("scenario", "clearance_mm", "seed", "human_error_scale")
     tried = len(trials.groups(names).keys)
     excluded = len(trials.where(np.isnan(trials.number("success"))).groups(names).keys)
     scenarios, methods, seeds = (_many(len(trials.distinct(x)), x) for x in ("scenario", "method", "seed"))

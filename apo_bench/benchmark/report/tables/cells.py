@@ -4,17 +4,25 @@ from collections.abc import Sequence
 
 from apo_bench.benchmark.analysis import Cell, HalfLevel, Paired
 from apo_bench.benchmark.report.tables.table import Column, Table, endings, interval_columns, place_columns
-from apo_bench.records import TrialSettings
+from apo_bench.records import TrialConfig
 
-_AXES = ("noise", "relations", "looks", "robot_error", "wrench", "stated_error", "abstain")
+_AXES = (
+    "noise",
+    "contact_source",
+    "max_reobservations",
+    "robot_error",
+    "ft_sensor",
+    "assumed_robot_error",
+    "min_predicted_success",
+)
 """Shown to people where they are not as usual in some cell."""
 
 
 def cell_table(cells: Sequence[Cell]) -> Table:
     """Axes that are as usual in every cell are left to files."""
-    unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialSettings, name) for c in cells)}
-    abstains = "abstain" in unusual
-    promises = any(c.promised is not None for c in cells)
+    unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
+    min_predicted_success = "min_predicted_success" in unusual
+    promises = any(c.predicted_success is not None for c in cells)
 
     def axis(name: str) -> Column:
         return Column(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
@@ -25,10 +33,10 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("scenario", "scenario", words=True),
             Column("clearance_mm", "clearance", text="{clearance_mm:g} mm", words=True),
             axis("noise"),
-            axis("relations"),
-            Column("careless", "careless", text="{words.careless}", words=True),
-            Column("level_mm", "level", "level", "{level_words}", words=True),
-            Column("level_deg"),
+            axis("contact_source"),
+            Column("human_error_scale", "human_error_scale", text="{words.careless}", words=True),
+            Column("noise_mm", "noise_level", "noise_level", "{level_words}", words=True),
+            Column("noise_deg"),
             Column("tightness"),
             Column("method", "method", words=True),
             Column("grasp"),
@@ -43,9 +51,13 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("executed", value="executed.trials"),
             Column("executed_rate", value="executed.rate"),
             *interval_columns("executed.interval", "executed_low_95", "executed_high_95"),
-            Column("abstained", "abstained" * abstains),
-            Column("wrong_when_executed", "wrong when executed" * abstains, text="{wrong_when_executed:percent}"),
-            Column("promised", "promised" * promises, text="{promised:percent}"),
+            Column("abstained", "abstained" * min_predicted_success),
+            Column(
+                "wrong_when_executed",
+                "wrong when executed" * min_predicted_success,
+                text="{wrong_when_executed:percent}",
+            ),
+            Column("predicted_success", "predicted_success" * promises, text="{promised:percent}"),
             Column("brier"),
             Column("as_demonstrated", value="demonstrated"),
             Column("as_demonstrated_rate", "as demonstrated", "demonstrated_rate", "{demonstrated_rate:percent}"),
@@ -131,7 +143,7 @@ def half_table(levels: Sequence[HalfLevel]) -> Table:
             Column("smallest_level", value="smallest"),
             Column("largest_level", value="largest"),
             Column("trials", "n"),
-            Column("half_level", "half success at level", "level", "{text}"),
+            Column("half_level", "half success at level", "noise_level", "{text}"),
             Column("surely_over", "surely", text="{sure_text}"),
             Column("surely_under"),
         ),

@@ -40,7 +40,7 @@ def felt_table(lines: Sequence[Line]) -> Table:
         (
             *place_columns(),
             Column("trials", "n"),
-            Column("touches", "touches", text="{touches:.1f}"),
+            Column("probe_contacts", "probe_contacts", text="{touches:.1f}"),
             Column("refused", "refused"),
             *(
                 Column(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
@@ -50,7 +50,7 @@ def felt_table(lines: Sequence[Line]) -> Table:
         ),
         "No robot felt.",
         (
-            "How far the base of a robot that feels (`+feel`) is off at the middle of the goals: by what its error was "
+            "How far the base of a robot that feels (`+probe`) is off at the middle of the goals: by what its error was "
             "drawn with, by what it was told, as it felt in the end, and how far that may be wrong, as it says itself. "
             "All are root mean squares of vectors: the square root of three times a standard deviation per axis. "
             "*Refused* are touches that contradicted the others, of all trials together."
@@ -66,8 +66,8 @@ def effort_table(lines: Sequence[Line]) -> Table:
             *_METHOD,
             Column("trials", "right"),
             Column("extra_operations", "extra operations", text="{extra_operations:.1f}"),
-            Column("sim_seconds", "simulated", text="{sim_seconds:.0f} s"),
-            Column("pushed_mm", "pushed at most", text="{pushed_mm:.2f} mm"),
+            Column("sim_time_s", "simulated", text="{sim_seconds:.0f} s"),
+            Column("displaced_mm", "pushed at most", text="{pushed_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
@@ -116,7 +116,7 @@ def calibration_table(lines: Sequence[Line]) -> Table:
         (
             Column("scenario", "scenario", words=True),
             Column("noise", "noise", words=True),
-            Column("relations", "relations", words=True),
+            Column("contact_source", "contact_source", words=True),
             Column("method", "method", words=True),
             Column("planned", "n"),
             Column("covered", "covered", text=share("covered")),
@@ -170,11 +170,11 @@ def recognition_table(lines: Sequence[Line]) -> Table:
         (
             Column("scenario", "scenario", words=True),
             Column("noise", "noise", words=True),
-            Column("eye", "eye", words=True),
-            Column("relations", "relations", words=True),
-            Column("careless", "careless", words=True),
-            Column("level_mm", "level [mm]", "level", words=True),
-            Column("level_deg", "level [deg]", words=True),
+            Column("pose_source", "pose_source", words=True),
+            Column("contact_source", "contact_source", words=True),
+            Column("human_error_scale", "human_error_scale", words=True),
+            Column("noise_mm", "level [mm]", "noise_level", words=True),
+            Column("noise_deg", "level [deg]", words=True),
             Column("demonstrations"),
             Column("complete", "all right", text="{complete} of {demonstrations}"),
             Column("rate", "rate", "all_right.rate", "{all_right.rate:percent}"),

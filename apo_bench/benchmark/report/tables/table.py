@@ -166,19 +166,30 @@ def place_columns(path: str = "place", levels: bool = True) -> tuple[Column, ...
     Args:
         path: From an item to its place.
     """
-    last = ("grasp", "fidelity", "looks", "robot_error", "wrench", "stated_error", "abstain")
+    last = (
+        "grasp",
+        "fidelity",
+        "max_reobservations",
+        "robot_error",
+        "ft_sensor",
+        "assumed_robot_error",
+        "min_predicted_success",
+    )
     return (
         Column("scenario", "scenario", f"{path}.scenario", words=True, group=True),
         Column("", "conditions", f"{path}.conditions", words=True, group=True),
-        *(Column(name, value=f"{path}.{name}") for name in ("clearance_mm", "noise", "relations", "careless")),
         *(
-            (Column("level_mm", value=f"{path}.level"), Column("level_deg", value=f"{path}.level_deg"))
+            Column(name, value=f"{path}.{name}")
+            for name in ("clearance_mm", "noise", "contact_source", "human_error_scale")
+        ),
+        *(
+            (Column("noise_mm", value=f"{path}.level"), Column("noise_deg", value=f"{path}.level_deg"))
             if levels
             else ()
         ),
         Column("method", "method", f"{path}.method", words=True),
         *(Column(name, value=f"{path}.{name}") for name in last),
-        *([Column("", "level", f"{path}.level_words")] * levels),
+        *([Column("", "noise_level", f"{path}.level_words")] * levels),
     )
 
 

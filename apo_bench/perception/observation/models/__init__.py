@@ -3,7 +3,7 @@
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displaced import floored, with_shared
 from apo_bench.perception.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.failures import CameraFailures
 from apo_bench.perception.observation.models.fitted import (
     LEAST_FREEDOM,
@@ -38,8 +38,8 @@ __all__ = (
     "Fitted",
     "HeavyTailed",
     "Isotropic",
-    "Level",
     "MeasuredNoise",
+    "NoiseLevel",
     "Outliers",
     "PerPart",
     "Residuals",

@@ -20,7 +20,7 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
     goals = displaced(demonstration.goals, xi)
-    stated = floored(covariance + demonstration.careless)
+    stated = floored(covariance + demonstration.human_error_covariance)
     return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
 

@@ -12,7 +12,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io import CsvRow, read_csv
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
 from apo_bench.perception.observation.models.residuals import Residuals
 
@@ -64,7 +64,7 @@ class Empirical:
     """
 
     sample: Sample
-    level: Level
+    noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
 
     FACTS: ClassVar[Facts] = Facts(
@@ -78,7 +78,7 @@ class Empirical:
     )
 
     def __post_init__(self) -> None:
-        check_measured_level(self.level, self.sample.covariance)
+        check_measured_level(self.noise_level, self.sample.covariance)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         n = len(assembly)
@@ -91,12 +91,12 @@ class Empirical:
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
         seen = observe_in_ray_frames(
-            self.camera, self.level, demonstration, assembly, sign * errors, sample.covariance, missed
+            self.camera, self.noise_level, demonstration, assembly, sign * errors, sample.covariance, missed
         )
         return replace(seen, outliers=measured_rates(sample.gross))
 
 
-def empirical_noise(path: Path, level: Level) -> Empirical:
+def empirical_noise(path: Path, noise_level: NoiseLevel) -> Empirical:
     """The noise model of a file of residuals; a file is read once.
 
     Raises:
@@ -108,7 +108,7 @@ def empirical_noise(path: Path, level: Level) -> Empirical:
         raise InputError(
             f"{path}: the file of residuals cannot be read; check the path behind 'empirical:'."
         ) from error
-    return Empirical(_read_once(path, state.st_mtime_ns, state.st_size), level)
+    return Empirical(_read_once(path, state.st_mtime_ns, state.st_size), noise_level)
 
 
 def residuals_text(residuals: Residuals) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.geometry import Array
 
 
-class Level(NamedTuple):
+class NoiseLevel(NamedTuple):
     """How much noise: standard deviation per axis."""
 
     mm: float

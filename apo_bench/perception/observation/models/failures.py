@@ -16,7 +16,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, approximate_symmetries, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displaced import observe_displaced
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 RATE = 0.3
 """Share of operations that are seen falsely."""
@@ -58,7 +58,7 @@ class Failure(NamedTuple):
 class CameraFailures:
     """Isotropic noise about poses some of which are false: a mixture of failures. At level 0 nothing is false."""
 
-    level: Level
+    noise_level: NoiseLevel
     failures: tuple[Failure, ...]
     """One after the other."""
     repeat: float = 0.0
@@ -112,13 +112,13 @@ class CameraFailures:
     def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
         """What a first look has wrong: the first draws of `__call__`."""
         goals = demonstration.goals.copy()
-        if max(self.level) > 0.0 and len(goals):
+        if max(self.noise_level) > 0.0 and len(goals):
             for failure in self.failures:
                 failure.displace(goals, demonstration, self.camera, failure.rate, rng)
         return FalseViews(np.abs(goals - demonstration.goals).max(axis=(1, 2), initial=0.0) > 0.0, goals)
 
     def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         xi = rng.standard_normal((len(views.goals), 6)) * sigma
         seeming = replace(demonstration, goals=views.goals)
         seen = observe_displaced(demonstration.assembly, seeming, xi, np.diag(sigma**2))
@@ -225,6 +225,6 @@ PRESETS: Mapping[str, Failure] = MappingProxyType(
 """Failures that have a name."""
 
 
-def make_failures(name: str, level: Level, rate: float = RATE, repeat: float = 0.0) -> CameraFailures:
+def make_failures(name: str, noise_level: NoiseLevel, rate: float = RATE, repeat: float = 0.0) -> CameraFailures:
     """The camera that fails in one way only, by the name of that."""
-    return CameraFailures(level, (PRESETS[name]._replace(rate=rate),), repeat)
+    return CameraFailures(noise_level, (PRESETS[name]._replace(rate=rate),), repeat)

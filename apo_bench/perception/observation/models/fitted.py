@@ -15,7 +15,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displaced import displaced, floored, observe_displaced, with_shared
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.perception.observation.models.tails import Split
 
@@ -26,7 +26,7 @@ LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
 _GAUSSIAN = 1e9
 """Degrees of freedom of a Gaussian, as good as infinitely many."""
-_AS_MEASURED = Level(1.0, 1.0)
+_AS_MEASURED = NoiseLevel(1.0, 1.0)
 LARGEST_M = 0.4
 LARGEST_RAD = 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
@@ -84,7 +84,7 @@ class Fitted:
     """
 
     measured: MeasuredNoise
-    level: Level
+    noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
 
     FACTS: ClassVar[Facts] = Facts(
@@ -102,7 +102,7 @@ class Fitted:
     )
 
     def __post_init__(self) -> None:
-        check_measured_level(self.level, self.covariance)
+        check_measured_level(self.noise_level, self.covariance)
 
     @property
     def covariance(self) -> Array:
@@ -120,15 +120,17 @@ class Fitted:
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
         seen = observe_in_ray_frames(
-            self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
+            self.camera, self.noise_level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
-        tails = stated_tails(measured, self.level, self.camera, seen.goals) if min(self.level) > 0.0 else None
+        tails = (
+            stated_tails(measured, self.noise_level, self.camera, seen.goals) if min(self.noise_level) > 0.0 else None
+        )
         seen = replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
         return seen if measured.view is None else self._displaced(seen, rng.standard_normal(6))
 
     def _displaced(self, seen: Observation, unit: Array) -> Observation:
         """What is seen if the whole view is off as well."""
-        sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.level, 3)
+        sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.noise_level, 3)
         if not sigma.any() or not len(seen.goals):
             return seen
         # E = P exp(e) P^-1 displaces all that is seen alike, about the middle of it.
@@ -156,11 +158,11 @@ def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) 
     return with_shared(seen, view_error(camera, goals, np.repeat(measured.view, 3) * LEVEL_UNITS))
 
 
-def stated_tails(measured: MeasuredNoise, level: Level, camera: Camera, goals: Array) -> Tails:
+def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, goals: Array) -> Tails:
     """The tails of inliers, in the frames of the rays on which parts are seen."""
     shift = measured.shift_mm
     turn = measured.turn_deg
-    units = np.repeat(LEVEL_UNITS[[0, 3]] * level, 2)
+    units = np.repeat(LEVEL_UNITS[[0, 3]] * noise_level, 2)
     each = (shift.across, shift.along, turn.across, turn.along)
     return Tails(
         frames=np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals),
@@ -183,14 +185,16 @@ def view_frame(camera: Camera, goals: Sequence[Array]) -> Array:
     return P
 
 
-def check_measured_level(level: Level, covariance: Array) -> None:
+def check_measured_level(noise_level: NoiseLevel, covariance: Array) -> None:
     """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
 
     Args:
         covariance: (6, 6), at level 1, [m, rad].
     """
     worst = np.sqrt(np.diagonal(covariance).reshape(2, 3).max(axis=1))
-    for value, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
+    for value, deviation, largest, unit in zip(
+        noise_level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True
+    ):
         if value * deviation > largest:
             raise InputError(
                 f"a level of {value:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
@@ -200,7 +204,7 @@ def check_measured_level(level: Level, covariance: Array) -> None:
 
 def observe_in_ray_frames(
     camera: Camera,
-    level: Level,
+    noise_level: NoiseLevel,
     demonstration: Demonstration,
     assembly: Assembly,
     errors: Array,
@@ -214,11 +218,11 @@ def observe_in_ray_frames(
         covariance: (6, 6), of inliers, alike.
         missed: (n,), what nothing is found for.
     """
-    scale = np.repeat([level.mm, level.deg], 3)
+    scale = np.repeat([noise_level.mm, noise_level.deg], 3)
     xi = camera.twists(demonstration.goals, errors * scale)
     stated = camera.covariance(displaced(demonstration.goals, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
-    missed = missed & (max(level) > 0.0)
+    missed = missed & (max(noise_level) > 0.0)
     goals = seen.goals.copy()
     stated = seen.covariance.copy()
     goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Tails
 from apo_bench.perception.observation.models.displaced import observe_displaced
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 LEAST_FACTOR = 0.3
 MOST_FACTOR = 4.0
@@ -28,7 +28,7 @@ class Isotropic:
     exactly zero: the goals are then those that were shown, bit for bit.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="the same in every direction",
@@ -39,7 +39,7 @@ class Isotropic:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         xi = rng.standard_normal((len(assembly), 6)) * sigma
         return observe_displaced(assembly, demonstration, xi, np.diag(sigma**2))
 
@@ -53,7 +53,7 @@ class PerPart:
     and its errors are those of `isotropic` times that.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="some parts are seen much worse than others",
@@ -70,7 +70,7 @@ class PerPart:
         unit = rng.standard_normal((len(assembly), 6))
         factor = part_factors(assembly.solids, rng)
         each = np.array([factor[operation.main] for operation in assembly.operations])
-        sigma = self.level.sigma() * each.reshape(-1, 1)
+        sigma = self.noise_level.sigma() * each.reshape(-1, 1)
         covariance = sigma[:, :, None] * np.eye(6) * sigma[:, None, :]
         return observe_displaced(assembly, demonstration, unit * sigma, covariance)
 
@@ -83,7 +83,7 @@ class HeavyTailed:
     It is scaled so that the level is the true standard deviation, which is finite above two degrees of freedom.
     """
 
-    level: Level
+    noise_level: NoiseLevel
     freedom: float = FREEDOM
     """Above 2, below which there is no covariance."""
 
@@ -96,15 +96,15 @@ class HeavyTailed:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         unit = rng.standard_normal((len(assembly), 6))
         scale = np.sqrt((self.freedom - 2.0) / rng.chisquare(self.freedom, (len(assembly), 1)))
         seen = observe_displaced(assembly, demonstration, unit * scale * sigma, np.diag(sigma**2))
-        return replace(seen, tails=self._tails(len(assembly))) if min(self.level) > 0.0 else seen
+        return replace(seen, tails=self._tails(len(assembly))) if min(self.noise_level) > 0.0 else seen
 
     def _tails(self, n: int) -> Tails:
         # A Student t of scale s has the variance s^2 nu / (nu - 2).
-        each = self.level.sigma()[[0, 0, 3, 3]]
+        each = self.noise_level.sigma()[[0, 0, 3, 3]]
         return Tails(
             frames=np.tile(np.eye(3), (n, 1, 1)),
             scales=each * np.sqrt((self.freedom - 2.0) / self.freedom),

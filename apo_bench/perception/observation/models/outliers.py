@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
 from apo_bench.geometry import Array, frozen
 from apo_bench.perception.observation.models.displaced import observe_displaced
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OUTLIERS = 0.1
 MISSES = 0.02
@@ -30,7 +30,7 @@ class Outliers:
     the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
     """
 
-    level: Level
+    noise_level: NoiseLevel
     outliers: float = OUTLIERS
     misses: float = MISSES
     times: float = OUTLIER_TIMES
@@ -61,12 +61,12 @@ class Outliers:
         return 1.0 + self.outliers * (self.times**2 - 1.0)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         unit = rng.standard_normal((len(assembly), 6))
         chance = rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
-        missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
+        missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
         goals = seen.goals.copy()
         covariance = seen.covariance.copy()
         goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]

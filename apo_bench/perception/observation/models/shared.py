@@ -9,7 +9,7 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displaced import observe_displaced, observe_shared
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.fitted import view_error, view_frame
 
 OWN = 1.0 / 20.0
@@ -28,7 +28,7 @@ class Bias:
     operations for independent ones are told too much.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error per part, the same in every operation that moves it",
@@ -39,7 +39,7 @@ class Bias:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         parts = sorted(assembly.solids)
         unit = dict(zip(parts, rng.standard_normal((len(parts), 6)), strict=True))
         own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
@@ -65,7 +65,7 @@ class BiasView:
     of the truth is in it; seen from there, e has the same distribution.
     """
 
-    level: Level
+    noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
 
     FACTS: ClassVar[Facts] = Facts(
@@ -78,7 +78,7 @@ class BiasView:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         unit = rng.standard_normal(6)
         own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
         if not len(assembly):
@@ -100,7 +100,7 @@ class Correlated:
     operations its standard deviation is the level.
     """
 
-    level: Level
+    noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
     correlation: float = CORRELATION
 
@@ -113,7 +113,7 @@ class Correlated:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = self.level.sigma()
+        sigma = self.noise_level.sigma()
         unit, own = rng.standard_normal((2, len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]

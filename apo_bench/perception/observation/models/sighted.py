@@ -15,7 +15,7 @@ from apo_bench.perception.observation.models.camera import (
     Camera,
 )
 from apo_bench.perception.observation.models.displaced import displaced, observe_displaced
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 ALONG_SIGHT = 3.0
 ACROSS_SIGHT = 0.5
@@ -38,7 +38,7 @@ class Anisotropic:
     leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is seen.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="worse along one line of sight, the same for all parts",
@@ -60,8 +60,8 @@ class Anisotropic:
         # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the frame that is seen, R_seen^t S1 e.
         sight = line_of_sight()
         unit = rng.standard_normal((len(assembly), 6))
-        place = self.level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
-        turn = np.radians(self.level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
+        place = self.noise_level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
+        turn = np.radians(self.noise_level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
         rotation = np.zeros((len(assembly), 6))
         rotation[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], unit[:, 3:] @ turn)
         R = (demonstration.goals @ pose.exp(rotation))[:, :3, :3]
@@ -81,7 +81,7 @@ class Sighted:
     parallel, while those of a camera 0.9 m away to parts half a metre apart differ by some 30 degrees.
     """
 
-    level: Level
+    noise_level: NoiseLevel
     camera: Camera = field(default_factory=Camera)
     across: float = ACROSS_SIGHT
     along: float = ALONG_SIGHT
@@ -110,8 +110,8 @@ class Sighted:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        mm = self.level.mm * 1e-3
-        rad = np.radians(self.level.deg)
+        mm = self.noise_level.mm * 1e-3
+        rad = np.radians(self.noise_level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
         xi = self.camera.twists(demonstration.goals, rng.standard_normal((len(assembly), 6)) * sigma)
         stated = self.camera.covariance(displaced(demonstration.goals, xi), np.diag(sigma**2))

@@ -18,7 +18,7 @@ from apo_bench.geometry import (
     turn_about,
 )
 from apo_bench.perception.observation.models.displaced import observe_displaced
-from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 WORSE = 3.0
 _MANY = 3.0
@@ -38,7 +38,7 @@ class Symmetric:
     two equal poses at most, whatever the level.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="turns about axes of symmetry are less certain; of equal poses the nearest is reported",
@@ -83,8 +83,8 @@ class Symmetric:
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
         """The standard deviations drawn and those stated, (6,) each, about the centre of volume, [m, rad]."""
-        turn = np.radians(self.level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
-        place = np.full(3, self.level.mm * 1e-3)
+        turn = np.radians(self.noise_level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
+        place = np.full(3, self.noise_level.mm * 1e-3)
         apart = np.where(np.isinf(fold), np.inf, np.pi / fold / np.sqrt(3.0))
         return np.append(place, turn), np.append(place, np.minimum(turn, apart))
 
@@ -111,10 +111,10 @@ class AnyTurn:
     The covariance is that about the pose of the same look which is nearest to what is reported.
     """
 
-    level: Level
+    noise_level: NoiseLevel
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        seen = Symmetric(self.level)(assembly, demonstration, rng)
+        seen = Symmetric(self.noise_level)(assembly, demonstration, rng)
         g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
         Ad = pose.adjoint(pose.inverse(g))
         C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)

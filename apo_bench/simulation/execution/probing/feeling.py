@@ -11,9 +11,9 @@ from typing import Protocol, final
 
 import numpy as np
 
-from apo_bench.assembly import Felt, Plan, Touch
+from apo_bench.assembly import Plan, ProbingResult, Touch
 from apo_bench.geometry import Array, pose
-from apo_bench.records import USUAL_WRENCH
+from apo_bench.records import USUAL_FT_SENSOR
 from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot import Robot, RobotError, WristSensor, wrist_of, zero
@@ -63,7 +63,7 @@ class Belief(Protocol):
         ...
 
     @property
-    def found(self) -> Felt:
+    def found(self) -> ProbingResult:
         """What has been found out."""
         ...
 
@@ -94,7 +94,7 @@ class Belief(Protocol):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Feels:
+class ProbingConfig:
     """How a robot feels."""
 
     belief: Belief
@@ -103,22 +103,22 @@ class Feels:
     """(6,): how far a part may slip in the hand, standard deviations of a twist in the frame of the tip, [m, rad]."""
     seed: tuple[int, ...]
     """Of the noise of its sensor."""
-    wrench: str = USUAL_WRENCH
+    wrench: str = USUAL_FT_SENSOR
     """The sensor at its wrist, as in `wrench_noise`."""
     acts: tuple[str, ...] = ACTS
     """What it does besides."""
 
 
-class Feeling:
+class ProbingState:
     """The state of a robot that feels, during one replay."""
 
-    def __init__(self, feels: Feels, plan: Plan, scene: Scene, error: RobotError | None) -> None:
+    def __init__(self, probing: ProbingConfig, plan: Plan, scene: Scene, error: RobotError | None) -> None:
         none = np.eye(4)
         joints = np.zeros(len(scene.arm.joints))
-        self.acts = feels.acts
+        self.acts = probing.acts
         self.plan = plan
-        self.belief = feels.belief
-        self._feels = feels
+        self.belief = probing.belief
+        self._feels = probing
         self._wrist: WristSensor | None = None
         self._kinematics = scene.kinematics
         self._error = error or RobotError(none, joints, none, np.tile(none, (len(plan.assembly), 1, 1)))
@@ -146,7 +146,7 @@ class Feeling:
         way = T_world_tip[:3, :3].T @ way
         return _OFF_SIGMAS * float(np.sqrt(way @ covariance @ way))
 
-    def as_seen(self, normal: Array, point: Array) -> tuple[Array, float]:
+    def is_uncorrected(self, normal: Array, point: Array) -> tuple[Array, float]:
         """Normal and offset of a plane, (3,) and [m], in the world as the eye has it, from where the arm takes it."""
         back = pose.inverse(self.residual.hand_eye)
         n = back[:3, :3] @ normal
@@ -201,7 +201,7 @@ class Feeling:
 
     def foot(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array, foot: Array) -> Touch:
         """What a foot of the held part tells that stands on the floor."""
-        n, d = self.as_seen(flush.normal, pose.apply(flush.T, flush.feet[:1])[0])
+        n, d = self.is_uncorrected(flush.normal, pose.apply(flush.T, flush.feet[:1])[0])
         return self.touch(robot, n, d, foot, (operation, T_tip_part), FOOT_SIGMA_M)
 
     def grip(self, operation: int, touches: Sequence[Touch], T_tip_part: Array, grip: Grip) -> Grip:

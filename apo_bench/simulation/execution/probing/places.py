@@ -12,7 +12,7 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.simulation.execution.beside import LEVEL, STAND_OFF_M, upright_walls
+from apo_bench.simulation.execution.beside import NOISE_LEVEL, STAND_OFF_M, upright_walls
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, gripper_boxes, shifted
@@ -138,7 +138,7 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
         (part, face)
         for part in sorted(plan.assembly.fixed)
         for face in plan.assembly.solids[part].faces.values()
-        if plan.start[part][2, :3] @ face.normal > LEVEL
+        if plan.start[part][2, :3] @ face.normal > NOISE_LEVEL
     ]
     return max(up, key=lambda each: face_area(each[1]), default=None)
 

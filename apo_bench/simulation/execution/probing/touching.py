@@ -16,7 +16,7 @@ from apo_bench.assembly import Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.beside import STAND_OFF_M, Beside, Flush, before_insertion
-from apo_bench.simulation.execution.probing.feeling import Feeling
+from apo_bench.simulation.execution.probing.feeling import ProbingState
 from apo_bench.simulation.execution.probing.places import (
     OPENING_M,
     ROOM_M,
@@ -58,7 +58,7 @@ _HIGH_M = 0.1
 """The hand passes from one place to the next so far above them."""
 
 
-def find_out(robot: Robot, feeling: Feeling) -> None:
+def find_out(robot: Robot, feeling: ProbingState) -> None:
     """Touch the floor, then walls from where the floor has told to be; the robot believes what it felt after each.
 
     Raises:
@@ -81,11 +81,11 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
         feeling.learn(robot, felt, differ=places is opposite_places)
 
 
-def _stand_off(robot: Robot, feeling: Feeling, T: Array, normal: Array) -> float:
+def _stand_off(robot: Robot, feeling: ProbingState, T: Array, normal: Array) -> float:
     return max(STAND_OFF_M, feeling.off_m(robot, T, normal))
 
 
-def _room(robot: Robot, feeling: Feeling, place: TouchPlace) -> str:
+def _room(robot: Robot, feeling: ProbingState, place: TouchPlace) -> str:
     """What to say where something was struck: nothing if the robot had room for what it may be off."""
     far = max(feeling.off_m(robot, place.T_world_tip, way) for way in np.eye(3))
     if far <= ROOM_M:
@@ -94,7 +94,7 @@ def _room(robot: Robot, feeling: Feeling, place: TouchPlace) -> str:
     return f"{before} aside, and may be off by {1e3 * far:.1f} mm"
 
 
-def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[Touch, Array]]:
+def _touched(robot: Robot, feeling: ProbingState, place: TouchPlace) -> list[tuple[Touch, Array]]:
     """Go there, press, come back; what it tells, if anything was felt, and what of the hand may have touched."""
     T = feeling.residual.hand_eye @ place.T_world_tip @ feeling.residual.tool
     way = feeling.residual.hand_eye[:3, :3] @ place.way
@@ -121,7 +121,7 @@ _CARRY = 0.4
 
 
 def touch_beside(
-    robot: Robot, feeling: Feeling, operation: int, t: Transfer, place: Beside, grip: Grip, held: Array
+    robot: Robot, feeling: ProbingState, operation: int, t: Transfer, place: Beside, grip: Grip, held: Array
 ) -> Grip:
     """Go there, press, come back; returns how the part is known to be held now.
 
@@ -145,7 +145,7 @@ def touch_beside(
         end = shifted(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
         left = press(robot, steady(robot.T, end, SPEED), place.way, feeling.touch_n, feeling.wrist)
         if left is not None:
-            n, d = feeling.as_seen(place.normal, place.edge)
+            n, d = feeling.is_uncorrected(place.normal, place.edge)
             touches = [feeling.touch(robot, n, d, place.point, (operation, held))]
         feeling.wrist.hold()
         robot.follow(smooth(robot.T, T, _LAID_DOWN))
@@ -181,7 +181,7 @@ MOST_S = 15.0
 DEEPEST_M = 0.012
 
 
-def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip) -> Grip:
+def lay(robot: Robot, feeling: ProbingState, operation: int, t: Transfer, grip: Grip) -> Grip:
     """Lay the held part down and lift it again, and touch a wall with its side; returns how it is known to be held now.
 
     Raises:
@@ -208,7 +208,7 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
     return grip
 
 
-def _laid(robot: Robot, feeling: Feeling, operation: int, flush: Flush, held: Array) -> list[Touch]:
+def _laid(robot: Robot, feeling: ProbingState, operation: int, flush: Flush, held: Array) -> list[Touch]:
     """Press the part on the floor until it lies; all its feet touch then."""
     law = _Laying(flush, averaged_s(flush, feeling.wrist.sigma))
     # About the middle of the feet: there, what rubs has no lever.

@@ -14,9 +14,9 @@ from apo_bench.perception.detection.evidence import Recognised
 from apo_bench.perception.detection.jointly import recognise_jointly
 
 
-def recognise_by(observation: Observation, kind: str = "recognised") -> Recognised:
+def recognise_by(observation: Observation, kind: str = "detected") -> Recognised:
     """Find the contacts of an observation in one of the ways of `RECOGNISED`, without those that came with it."""
-    return recognise_jointly(observation) if kind == "recognised-jointly" else recognise(observation)
+    return recognise_jointly(observation) if kind == "detected-jointly" else recognise(observation)
 
 
 def with_recognised_contacts(observation: Observation, kind: str) -> Observation:
@@ -29,9 +29,9 @@ def count_contacts(right: Assembly, told: Assembly) -> dict[str, int]:
     true = _contacts(right)
     named = _contacts(told)
     return {
-        "contacts_right": len(true & named),
-        "contacts_missed": len(true - named),
-        "contacts_false": len(named - true),
+        "contacts_true_positive": len(true & named),
+        "contacts_false_negative": len(true - named),
+        "contacts_false_positive": len(named - true),
     }
 
 

@@ -10,17 +10,17 @@ from typing import Any
 
 import pytest
 
-from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.benchmark.analysis import ALL, recognitions
 from apo_bench.benchmark.report.tables.methods import recognition_table
 from apo_bench.cli import app as cli
-from apo_bench.records import RECOGNISED
+from apo_bench.records import DETECTED
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from tests import pages
 from tests.benchmark.analysis.test_rates import UNCOUNTED
 
 SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")
-SPEC = TrialSettings("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)
+SPEC = TrialConfig("block_on_block", noise_mm=0.5, noise_deg=0.5, human_error_scale=0.0, method="contact", seed=4)
 
 
 @pytest.fixture(scope="module")
@@ -33,55 +33,75 @@ def shown(scene: Scene) -> SimulatedDemonstration:
     return simulate_demonstration(scene, 0.0, 4)
 
 
-def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) -> dict[str, Any]:
+def row(contact_source: str, method: str = "contact", seed: int = 0, **changes: Any) -> dict[str, Any]:
     """What a table needs of a row."""
-    base = {"scenario": "one", "noise": "isotropic", "eye": "noise", "relations": relations, "careless": 0.0}
-    counts = {"contacts_right": 3, "contacts_missed": 0, "contacts_false": 0}
-    level = {"level": 1.0, "level_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
-    return base | level | counts | changes
+    base = {
+        "scenario": "one",
+        "noise": "isotropic",
+        "pose_source": "noise-model",
+        "contact_source": contact_source,
+        "human_error_scale": 0.0,
+    }
+    counts = {"contacts_true_positive": 3, "contacts_false_negative": 0, "contacts_false_positive": 0}
+    noise_level = {"noise_level": 1.0, "noise_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
+    return base | noise_level | counts | changes
 
 
-@pytest.mark.parametrize("relations", RECOGNISED)
+@pytest.mark.parametrize("contact_source", DETECTED)
 def test_a_trial_says_how_many_contacts_were_recognised(
-    scene: Scene, shown: SimulatedDemonstration, relations: str
+    scene: Scene, shown: SimulatedDemonstration, contact_source: str
 ) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, simulated=shown)
+    made = run_trial(TrialConfig(**(asdict(SPEC) | {"contact_source": contact_source})), scene, simulated=shown)
     assert made["success"] is True
-    assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (2, 0, 0)
-    assert (made["relations"], made["wrong_relation"]) == (relations, None)
+    assert (made["contacts_true_positive"], made["contacts_false_negative"], made["contacts_false_positive"]) == (
+        2,
+        0,
+        0,
+    )
+    assert (made["contact_source"], made["wrong_contact"]) == (contact_source, None)
 
 
 def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: SimulatedDemonstration) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, simulated=shown)
+    made = run_trial(TrialConfig(**(asdict(SPEC) | {"method": "uncorrected"})), scene, simulated=shown)
     assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
 
 
 def test_missed_and_false_relations_are_counted_like_recognised_ones(
     scene: Scene, shown: SimulatedDemonstration
 ) -> None:
-    for relations, counts in (("missed", (1, 1, 0)), ("false", (2, 0, 1)), ("given", (2, 0, 0))):
-        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, simulated=shown)
-        assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == counts
+    for contact_source, counts in (("false-negative", (1, 1, 0)), ("false-positive", (2, 0, 1)), ("given", (2, 0, 0))):
+        made = run_trial(TrialConfig(**(asdict(SPEC) | {"contact_source": contact_source})), scene, simulated=shown)
+        assert (
+            made["contacts_true_positive"],
+            made["contacts_false_negative"],
+            made["contacts_false_positive"],
+        ) == counts
 
 
 def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
-    rows = [row("recognised", "paper"), row("recognised", "contact"), row("recognised", seed=1, contacts_missed=1)]
-    (found,) = recognitions([*rows, row("given"), row("missed"), row("recognised", "none", **UNCOUNTED)])
-    assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [2, 1, 6, 1, 0]
+    rows = [row("detected", "paper"), row("detected", "contact"), row("detected", seed=1, contacts_false_negative=1)]
+    (found,) = recognitions([*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)])
+    assert [found[name] for name in ("demonstrations", "complete", "right", "false-negative", "false-positive")] == [
+        2,
+        1,
+        6,
+        1,
+        0,
+    ]
     assert found["precision"] == 1.0
     assert found["recall"] == pytest.approx(6 / 7)
 
 
 def test_scenarios_are_also_counted_together() -> None:
-    rows = [row("recognised"), row("recognised", scenario="two", contacts_right=1, contacts_false=2)]
+    rows = [row("detected"), row("detected", scenario="two", contacts_right=1, contacts_false_positive=2)]
     found = {line["scenario"]: line for line in recognitions(rows)}
     assert list(found) == ["one", "two", ALL]
-    assert [found[ALL][name] for name in ("demonstrations", "complete", "right", "false")] == [2, 1, 4, 2]
+    assert [found[ALL][name] for name in ("demonstrations", "complete", "right", "false-positive")] == [2, 1, 4, 2]
     assert found["two"]["precision"] == pytest.approx(1 / 3)
 
 
 def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
-    found = recognitions([row("recognised-jointly", contacts_right=0, contacts_missed=3)])
+    found = recognitions([row("detected-jointly", contacts_right=0, contacts_false_negative=3)])
     assert (found[0]["precision"], found[0]["recall"]) == (None, 0.0)
     assert recognition_table(found).markdown()[-1].endswith("| 3 | 0 | – | 0.00 % |")
     assert recognition_table(()).markdown() == ["No method was told relations that were recognised."]
@@ -93,13 +113,24 @@ def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
 
 def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "rows"
-    given = ["--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1", "--workers", "1"]
-    assert cli.main(["sweep", "block_on_block", *given, "--relations", "given,recognised", "--out", str(out)]) == 0
+    given = [
+        "--noise-level",
+        "0.5",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected,contact",
+        "--trials",
+        "1",
+        "--workers",
+        "1",
+    ]
+    assert cli.main(["sweep", "block_on_block", *given, "--contact-source", "given,recognised", "--out", str(out)]) == 0
     rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert [(r["method"], r["relations"]) for r in rows] == [
-        ("none", "given"),
+    assert [(r["method"], r["contact_source"]) for r in rows] == [
+        ("uncorrected", "given"),
         ("contact", "given"),
-        ("contact", "recognised"),
+        ("contact", "detected"),
     ]
     assert cli.main(["report", str(out)]) == 0
     page = pages.lines(out / "report.html")
@@ -110,7 +141,7 @@ def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["recognise", "stick_in_tower", "--observation", SEEN, "--relations", "recognised-jointly"]
+    asked = ["recognise", "stick_in_tower", "--observation", SEEN, "--contact-source", "detected-jointly"]
     assert cli.main(asked) == 0
     said = capsys.readouterr().out
     assert "this set of contacts is right with probability 0.9" in said or "with probability 1.00" in said
@@ -122,7 +153,9 @@ def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_nothing_is_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["recognise", "stick_in_tower", "--level", "0", "--careless", "1", "--seed", "3"]) == 0
+    assert (
+        cli.main(["recognise", "stick_in_tower", "--noise-level", "0", "--human-error-scale", "1", "--seed", "3"]) == 0
+    )
     said = capsys.readouterr().out
     assert " 0.00 " in said
     assert "-0.00" not in said
@@ -140,19 +173,22 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
     form = json.loads(capsys.readouterr().out)
     assert form["schema"] == "apo-bench/recognised/2"
     assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
-    assert form["contacts_missed"] == len(form["missed"])
-    assert form["contacts_right"] == sum(contact["in_scenario"] for contact in form["contacts"])
+    assert form["contacts_false_negative"] == len(form["missed"])
+    assert form["contacts_true_positive"] == sum(contact["in_scenario"] for contact in form["contacts"])
     assert all(abs(contact["gap_mm"]) <= contact["allowed_gap_mm"] for contact in form["contacts"])
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["recognise", "stick_in_tower", "--relations", "given"], "unknown way of recognising 'given'"),
-        (["recognise", "stick_in_tower", "--observation", SEEN, "--level", "1"], "--level, which draws a trial"),
+        (["recognise", "stick_in_tower", "--contact-source", "given"], "unknown way of recognising 'given'"),
         (
-            ["replay", "stick_in_tower", "--observation", SEEN, "--relations", "missed"],
-            "--relations was given together",
+            ["recognise", "stick_in_tower", "--observation", SEEN, "--noise-level", "1"],
+            "--noise-level, which draws a trial",
+        ),
+        (
+            ["replay", "stick_in_tower", "--observation", SEEN, "--contact-source", "missed"],
+            "--contact-source was given together",
         ),
     ],
 )
@@ -164,8 +200,12 @@ def test_wrong_requests_get_one_sentence(arguments: list[str], words: str, capsy
 
 
 def test_a_measured_observation_may_be_recognised(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = ["--method", "contact", "--relations", "recognised", "--json"]
+    wanted = ["--method", "contact", "--contact-source", "detected", "--json"]
     assert cli.main(["replay", "stick_in_tower", "--observation", SEEN, *wanted]) == 0
     made = json.loads(capsys.readouterr().out)
-    assert (made["success"], made["noise"], made["relations"]) == (True, "measured", "recognised")
-    assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (9, 0, 0)
+    assert (made["success"], made["noise"], made["contact_source"]) == (True, "measured", "detected")
+    assert (made["contacts_true_positive"], made["contacts_false_negative"], made["contacts_false_positive"]) == (
+        9,
+        0,
+        0,
+    )

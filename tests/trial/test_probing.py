@@ -7,12 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
-from apo_bench.records import Row, Salt, look_up
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
+from apo_bench.records import SecretSeed, TrialRecord, look_up
 from apo_bench.records.run.validation import unwritable
 from apo_bench.trial.stages import IN_HAND, WRENCH, stream, stream_key
 
-FELT = ("touches", "touches_refused", "felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg")
+FELT = (
+    "probe_contacts",
+    "probe_contacts_rejected",
+    "base_error_estimate_mm",
+    "base_error_estimate_deg",
+    "base_error_std_mm",
+    "base_error_std_deg",
+)
 
 
 @pytest.fixture(scope="module")
@@ -20,14 +27,19 @@ def scene() -> Scene:
     return build_scene(load_scenario("block_on_block"))
 
 
-def row(scene: Scene, **more: Any) -> Row:
-    asked = {"method": "oracle+feel", "careless": 0.0, "fidelity": "contact", "robot_error": "hand_eye:0.5/0.1"} | more
-    return run_trial(TrialSettings("block_on_block", seed=3, **asked), scene)
+def row(scene: Scene, **more: Any) -> TrialRecord:
+    asked = {
+        "method": "oracle+probe",
+        "human_error_scale": 0.0,
+        "fidelity": "near-contact",
+        "robot_error": "hand_eye:0.5/0.1",
+    } | more
+    return run_trial(TrialConfig("block_on_block", seed=3, **asked), scene)
 
 
 def test_a_row_says_what_was_felt_and_with_what(scene: Scene) -> None:
-    found = row(scene, wrench="ideal", stated_error="hand_eye:1/0.2")
-    assert (found["wrench"], found["stated_error"]) == ("ideal", "hand_eye:1/0.2")
+    found = row(scene, ft_sensor="ideal", assumed_robot_error="hand_eye:1/0.2")
+    assert (found["ft_sensor"], found["assumed_robot_error"]) == ("ideal", "hand_eye:1/0.2")
     assert found["touches"]
     for column in FELT[2:]:
         assert look_up(found, column) > 0.0
@@ -35,20 +47,20 @@ def test_a_row_says_what_was_felt_and_with_what(scene: Scene) -> None:
 
 
 def test_a_robot_that_does_not_feel_says_nothing(scene: Scene) -> None:
-    found = row(scene, method="oracle+search")
+    found = row(scene, method="oracle+spiral")
     assert [look_up(found, column) for column in FELT] == [None] * len(FELT)
-    again = row(scene, method="oracle+search", wrench="cobot", stated_error="unstated")
-    given = ("spec_hash", "wrench", "stated_error")
+    again = row(scene, method="oracle+spiral", ft_sensor="joint-torque", assumed_robot_error="unknown")
+    given = ("config_hash", "ft_sensor", "assumed_robot_error")
     same = [column for column in found if column not in given]
     assert [look_up(again, column) for column in same] == [look_up(found, column) for column in same]
 
 
 def test_the_noise_of_the_sensor_has_a_stream_of_its_own() -> None:
     assert WRENCH == IN_HAND + 1
-    salt = Salt(b"0" * 32)
-    for given in (None, salt):
+    secret_seed = SecretSeed(b"0" * 32)
+    for given in (None, secret_seed):
         key = stream_key(3, WRENCH, given)
         assert np.random.default_rng(key).random() == stream(3, WRENCH, given).random()
     assert stream_key(3, WRENCH) == (3, WRENCH)
-    assert stream_key(3, WRENCH, salt)[:2] == (3, WRENCH)
-    assert len(stream_key(3, WRENCH, salt)) > 2
+    assert stream_key(3, WRENCH, secret_seed)[:2] == (3, WRENCH)
+    assert len(stream_key(3, WRENCH, secret_seed)) > 2

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation, Poses, placements
 from apo_bench.geometry import Array
-from apo_bench.records import RANGE, Row, TrialSettings
+from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.track import Chapter, FilmTrack, scenario_chapter
 from apo_bench.simulation.scene import Scene
@@ -21,7 +21,7 @@ AS_TRUE = "true"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Story:
+class Rollout:
     """One trial, or what a scenario asks for."""
 
     scene: Scene
@@ -32,21 +32,21 @@ class Story:
     """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
 
 
-def scenario_story(scene: Scene) -> Story:
+def scenario_story(scene: Scene) -> Rollout:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
     chapter = scenario_chapter(scene, layout.start, layout.goals)
-    return Story(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
+    return Rollout(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
 
 
 def trial_story(
-    spec: TrialSettings,
+    spec: TrialConfig,
     scene: Scene,
     seen: Observation,
     track: FilmTrack,
-    row: Row,
+    row: TrialRecord,
     simulated: SimulatedDemonstration | None = None,
-) -> Story:
+) -> Rollout:
     """What is to be seen of a trial that was replayed.
 
     Args:
@@ -58,7 +58,7 @@ def trial_story(
     method = row["method"]
     start = plan.start
     goals = {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
-    if method == "none" or np.array_equal(seen.goals, plan.goals):
+    if method == "uncorrected" or np.array_equal(seen.goals, plan.goals):
         del goals[AS_CORRECTED]
     chapters = []
     if simulated is not None:
@@ -74,10 +74,10 @@ def trial_story(
         good=row["success"],
     )
     true = goals.get(AS_TRUE, plan.goals)
-    return Story(scene, (*chapters, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
+    return Rollout(scene, (*chapters, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
 
 
-def ending(row: Row) -> str:
+def ending(row: TrialRecord) -> str:
     """How a replay ended: `failure at operation 3 (force_stop): the motion .. was stopped`."""
     if row["success"]:
         return f"success: {row['sentence']}"
@@ -86,15 +86,15 @@ def ending(row: Row) -> str:
     return f"failure{where} ({row['failure_code']}): {row['sentence']}"
 
 
-def _demonstration(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Chapter:
+def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Chapter:
     track = FilmTrack()
-    watch_again(scene, simulated, spec.careless, spec.seed, spec.salt, track.hooks)
-    how = f"seen with errors of {spec.level_mm:g} mm and {spec.level_deg:g} deg"
+    watch_again(scene, simulated, spec.human_error_scale, spec.seed, spec.secret_seed, track.hooks)
+    how = f"seen with errors of {spec.noise_mm:g} mm and {spec.noise_deg:g} deg"
     return Chapter(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
         world=scene.shown,
         start=simulated.layout.start,
         moments=tuple(track.moments),
-        ending=f"demonstrated; {'seen by a range finder' if spec.eye == RANGE else how}, then planned and replayed",
+        ending=f"demonstrated; {'seen by a range finder' if spec.pose_source == DEPTH_CAMERA else how}, then planned and replayed",
         good=None,
     )

@@ -1,14 +1,11 @@
-"""A row: all that is kept of one trial, one line of `trials.jsonl`.
+"""The record of a trial: one line of `trials.jsonl`.
 
-Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbered from 1. What is written and read is
-checked by these types: finite numbers in their range, and no other fields.
-
-The settings of a trial as columns of its row: which of them tell trials apart, and settings out of rows and options.
-
-Trials of one sweep differ in the columns `KEY`.
+Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbered from 1. Records are checked by these
+types when they are written and read: finite numbers in their range, and no other columns. The trials of one sweep
+differ in the columns `KEY`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from operator import itemgetter
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_type_hints
@@ -16,21 +13,7 @@ from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_type_hin
 from msgspec import Meta
 
 from apo_bench.records.outcomes import CODES, STAGES
-from apo_bench.records.settings import (
-    LARGEST_SEED,
-    SETTINGS,
-    CarelessnessValue,
-    ClearanceMm,
-    Eye,
-    Fidelity,
-    LooksAllowed,
-    Name,
-    NoiseLevel,
-    Promise,
-    Seed,
-    TimestepS,
-    TrialSettings,
-)
+from apo_bench.records.settings import LARGEST_SEED, SETTINGS, Name, TrialConfig
 
 LONGEST_SENTENCE = 1000
 LARGEST_NUMBER = 1e15
@@ -91,57 +74,33 @@ class Predicted(TypedDict):
     """Of what the arm cannot do."""
 
 
-class Row(TypedDict, total=False):
-    """A whole row has all of these, in this order; what a part of a trial finds out is some of them."""
+class _Columns(TypedDict, total=False):
+    """Columns before the results whose names stand in the code; the columns of all settings are in `RECORD_FIELDS`."""
 
-    schema: Name
-    """Version of these fields."""
-    env_id: Name
-    """Version of the environment."""
-    spec_hash: Name
-    """16 digits over the code, the files and all settings but method and seed: rows with the same may be counted
-    together."""
-    scenario: Name
-    """Name of the scenario."""
-    level: NoiseLevel | None
-    """Standard deviation of the positions seen, per axis [mm]; with the eye `range`, of one ray. Null if measured."""
-    level_deg: NoiseLevel | None
-    """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`. Null if measured."""
-    careless: CarelessnessValue | None
-    """How far the human deviates: 0 is a careful one, 1 the scenario's. Null if measured."""
-    clearance_mm: ClearanceMm
-    """Room per side between parts that fit into one another [mm]."""
-    eye: Eye
-    """`noise`: poses with noise that is drawn; `range`: measured in depth images."""
-    noise: Name
-    """The noise model; `range` with that eye, `measured` for an observation from a file."""
-    grasp: Name
-    """`friction`, or `weld` for an ideal gripper."""
-    arm: Name
-    """The robot."""
-    robot_error: Name
-    """What is wrong with the robot itself: `none`, or standard deviations of what was drawn, `hand_eye:1/0.2`."""
-    relations: Name
-    """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
-    method: Name
-    """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector; with `+search` or `+feel` by what robot."""
-    looks: LooksAllowed
-    """How often a corrector that can ask was allowed to look at operations again."""
-    wrench: Name
-    """The force and torque sensor at the wrist; without `+feel` nothing read it."""
-    stated_error: Name
-    """How wrong the robot was said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by
-    others. Without `+feel` nobody asked."""
-    abstain: Promise
-    """A plan that promised less was not carried out."""
-    seed: Seed
-    """Number of the trial: trials of one seed meet the same layout, human and noise."""
-    salt: Name | None
-    """Hash of the secret that the trial was drawn with; null for one that everybody can draw."""
-    timestep_s: TimestepS
-    """Time step of the physics [s]."""
-    fidelity: Fidelity
-    """`full`, or `contact`: only the part of each motion in which things may touch was simulated."""
+    schema: str
+    env_id: str
+    config_hash: str
+    scenario: str
+    noise_mm: float | None
+    noise_deg: float | None
+    human_error_scale: float | None
+    clearance_mm: float
+    pose_source: str
+    noise: str
+    grasp: str
+    arm: str
+    contact_source: str
+    method: str
+    seed: int
+    secret_seed: str | None
+
+
+_COLUMNS = frozenset(get_type_hints(_Columns))
+
+
+class TrialRecord(_Columns, total=False):
+    """A complete record has all of these, in this order; the record of a part of a trial has some of them."""
+
     thresholds: dict[str, _Size] | None
     """What the judge demands: lengths in mm, angles in degrees."""
     demonstration: str | None
@@ -173,19 +132,19 @@ class Row(TypedDict, total=False):
     """Smallest overlap of faces that should touch, as a part of the true overlap."""
     penetration_mm: _Number | None
     """Largest depth of one part in another [mm]."""
-    pushed_mm: _Number | None
+    displaced_mm: _Number | None
     """Largest distance by which a part that was in place was moved in the room, whether or not it counts [mm]."""
-    freed: list[_Operation] | None
+    corrected_operations: list[_Operation] | None
     """Operations whose motion parameters were corrected."""
-    tried: list[FreedSet] | None
+    tried_corrections: list[FreedSet] | None
     """Which operations were freed at which step, and the gap that was left."""
     extra_operations: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
     """Steps of the plan beyond doing every operation once."""
-    free_moved: list[FreeMoved] | None
+    fit_adjustments: list[FreeMoved] | None
     """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
-    predicted: Predicted | None
+    failure_prediction: Predicted | None
     """What the plan said about itself before it was carried out."""
-    promised: _Share | None
+    predicted_success: _Share | None
     """Probability of success that the plan stated before it was carried out; null where there was no plan."""
     gap_before_mm: _Number | None
     """Gap of the contacts at the poses seen [mm]."""
@@ -193,7 +152,7 @@ class Row(TypedDict, total=False):
     """Gap of the contacts at the corrected poses [mm]."""
     chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
     """Statistic of the test whether contacts and poses seen are consistent."""
-    chi_square_freedom: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
+    chi_square_dof: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
@@ -203,11 +162,11 @@ class Row(TypedDict, total=False):
     """Contacts that the test suspects."""
     dropped: list[Name] | None
     """Contacts that the corrector left out."""
-    left_out: list[_Operation] | None
+    inferred_operations: list[_Operation] | None
     """Operations of which nothing that was seen was believed, or nothing was seen, and that were inferred."""
-    seen_again: _Count | None
+    reobservations: _Count | None
     """How often operations were looked at again, all together; null where no corrector was asked."""
-    wrong_relation: Name | None
+    wrong_contact: Name | None
     """The contact that is wrong, where wrong ones were given."""
     inside_95: bool | None
     """Whether the truth lies in the 95 % region that the corrector states."""
@@ -215,11 +174,11 @@ class Row(TypedDict, total=False):
     """Root mean square distance of the plan from the truth, along directions that contacts fix [mm]."""
     planned_error_free_mm: _Size | None
     """Root mean square distance of the plan from the truth, along directions that contacts leave free [mm]."""
-    contacts_right: _Count | None
+    contacts_true_positive: _Count | None
     """Contacts that the corrector was told and that are right."""
-    contacts_missed: _Count | None
+    contacts_false_negative: _Count | None
     """Contacts that are there and that the corrector was not told."""
-    contacts_false: _Count | None
+    contacts_false_positive: _Count | None
     """Contacts that the corrector was told and that are not there."""
     joint_control: str | None
     """What moved the joints of the arm, its own actuators or servos made for it, and how much stronger the drive of its
@@ -232,40 +191,51 @@ class Row(TypedDict, total=False):
     """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
     peak_force_n: _Size | None
     """Largest contact force on what was held, without the gripper's, behind a low-pass filter of 20 ms [N]."""
-    moved_in_hand: list[MovedInHand] | None
+    grasp_slip: list[MovedInHand] | None
     """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
-    touches: _Count | None
+    probe_contacts: _Count | None
     """Touches that told the robot something about itself. This and what follows is null of a robot that does not feel.
     """
-    touches_refused: _Count | None
+    probe_contacts_rejected: _Count | None
     """Touches that contradicted the others and what was stated, so that they were not believed."""
-    felt_mm: _Size | None
+    base_error_estimate_mm: _Size | None
     """How far the robot's base was believed to be off in the end, at the middle of the goals [mm]."""
-    felt_deg: _Size | None
+    base_error_estimate_deg: _Size | None
     """The same as an angle [deg]."""
-    felt_sure_mm: _Size | None
+    base_error_std_mm: _Size | None
     """How far that may be wrong, as the robot says itself: root mean square, as a vector [mm]."""
-    felt_sure_deg: _Size | None
+    base_error_std_deg: _Size | None
     """The same of the angle [deg]."""
-    sim_seconds: _Size | None
+    sim_time_s: _Size | None
     """Simulated time [s]."""
 
 
-_ENDS: Any = Literal
-_CODE = _ENDS[tuple(CODES)] | None
+def _setting_columns() -> Iterator[tuple[str, Any]]:
+    literal: Any = Literal
+    for name, info in SETTINGS.items():
+        kind = Name if name == "secret_seed" else literal[info.choices] if info.choices else info.kind
+        yield name, kind | None if info.drawn else kind
+
+
+_LITERAL: Any = Literal
+_CODE = _LITERAL[tuple(CODES)] | None
 _CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
-_CLOSED["failure_stage"] = _ENDS[STAGES] | None
-ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
+_CLOSED["failure_stage"] = _LITERAL[STAGES] | None
+RECORD_FIELDS: Mapping[str, Any] = MappingProxyType(
+    {"schema": Name, "env_id": Name, "config_hash": Name}
+    | dict(_setting_columns())
+    | {name: kind for name, kind in get_type_hints(TrialRecord, include_extras=True).items() if name not in _COLUMNS}
+    | _CLOSED
+)
 """Column -> its type, with the range that it may have."""
-_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name != "salt")
 REQUIRED = (
-    *("schema", "env_id", "spec_hash", *_SETTING_COLUMNS),
+    *("schema", "env_id", "config_hash", *(name for name in SETTINGS if name != "secret_seed")),
     *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),
 )
-"""Without them a line is no row; what else a row does not say is null."""
+"""Columns without which a line is no record; other columns that are missing are null."""
 
 
-def look_up(row: Row, column: str) -> Any:
+def look_up(row: TrialRecord, column: str) -> Any:
     """What a row says in a column that is not named where this is written."""
     return row.get(column)
 
@@ -277,43 +247,46 @@ def finite(x: float | None) -> float | None:
 
 Key = tuple[Any, ...]
 """The columns `KEY` of a row."""
-KEY = tuple(info.column for info in SETTINGS.values() if info.key)
+KEY = tuple(info.name for info in SETTINGS.values() if info.key)
 _KEY_VALUES = itemgetter(*KEY)
 
 
-def row_key(row: Mapping[str, Any]) -> Key:
+def record_key(row: Mapping[str, Any]) -> Key:
     """The key of the trial that a row is of."""
     key: Key = _KEY_VALUES(row)
     return key
 
 
-def trial_key(trial: TrialSettings, scenario: str) -> Key:
+def trial_key(trial: TrialConfig, scenario: str) -> Key:
     """The key of a trial.
 
     Args:
         scenario: The name of the scenario.
     """
-    return row_key(setting_columns(trial, scenario))
+    return record_key(setting_columns(trial, scenario))
 
 
-def setting_columns(settings: TrialSettings, scenario: str) -> dict[str, Any]:
+def setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
     """The settings as they stand in a row.
 
     Args:
         scenario: The name of the scenario.
     """
-    columns = {info.column: getattr(settings, name) for name, info in SETTINGS.items()}
-    return columns | {"scenario": scenario, "salt": None if settings.salt is None else settings.salt.hash}
+    columns = {info.name: getattr(settings, name) for name, info in SETTINGS.items()}
+    return columns | {
+        "scenario": scenario,
+        "secret_seed": None if settings.secret_seed is None else settings.secret_seed.hash,
+    }
 
 
-def settings_of(row: Mapping[str, Any], scenario: str) -> TrialSettings:
+def settings_of(row: Mapping[str, Any], scenario: str) -> TrialConfig:
     """The settings of the trial that a row is of, without its salt, which no row tells.
 
     Args:
         scenario: A name, or the path of a scenario file.
     """
-    values = {name: row.get(info.column, info.default) for name, info in SETTINGS.items()}
-    return TrialSettings(**(values | {"scenario": scenario, "salt": None}))
+    values = {name: row.get(info.name, info.default) for name, info in SETTINGS.items()}
+    return TrialConfig(**(values | {"scenario": scenario, "secret_seed": None}))
 
 
 def in_python(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,33 +15,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Scene, SweepSettings, TrialSettings, run_sweep
+from apo_bench import InputError, Scene, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.analysis import tally
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
-from apo_bench.perception.observation.noise import Level, make_noise
-from apo_bench.records import Salt, read_salt, salt_of_sweep
-from apo_bench.records import salt as module
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.records import SecretSeed, read_secret_seed, secret_seed_of_sweep
+from apo_bench.records import secret_seed as module
 from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.salt import make_salt
-from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.records.secret_seed import make_secret_seed
+from apo_bench.trial.fingerprint import config_hash
 from apo_bench.trial.stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
 from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
-HERE = Salt(bytes(range(16)))
-THERE = Salt(bytes(range(1, 33)))
+HERE = SecretSeed(bytes(range(16)))
+THERE = SecretSeed(bytes(range(1, 33)))
 HEX = "8d217488cd5974580ccd50092e6d071ae625d86a6e19b8fc95ab5f4914f76f02"
 """What a salt may look like; the same in every process, so that workers collect the same tests."""
 HOPELESS = 40.0
 """A level [mm, degrees] at which plans are refused before the arm moves, so that a trial costs little."""
-GRID = SweepSettings(("block_on_block",), (HOPELESS,), (0.0,), ("none", "paper"), trials=2, seed=3, grasps=("weld",))
+GRID = SweepConfig(
+    ("block_on_block",), (HOPELESS,), (0.0,), ("uncorrected", "paper"), trials=2, seed=3, grasp=("weld",)
+)
 
 
-def state(seed: int, which: int, salt: Salt | None = None) -> Any:
-    return stream(seed, which, salt).bit_generator.state
+def state(seed: int, which: int, secret_seed: SecretSeed | None = None) -> Any:
+    return stream(seed, which, secret_seed).bit_generator.state
 
 
 @pytest.mark.parametrize("seed", [7, 2**53 - 1])
@@ -52,23 +54,23 @@ def test_without_a_salt_the_streams_are_those_of_seed_and_stage(seed: int) -> No
 
 def test_a_salt_makes_every_stream_another_one() -> None:
     drawn = [
-        int(stream(seed, which, salt).integers(2**63))
+        int(stream(seed, which, secret_seed).integers(2**63))
         for seed in (0, 1, 2**33 + 5)
         for which in range(6)
-        for salt in (None, HERE, THERE)
+        for secret_seed in (None, HERE, THERE)
     ]
     assert len(set(drawn)) == len(drawn)
-    assert state(3, ARM, HERE) == state(3, ARM, Salt(bytes(range(16))))
+    assert state(3, ARM, HERE) == state(3, ARM, SecretSeed(bytes(range(16))))
 
 
 def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
-    noise = make_noise("isotropic", Level(1.0, 1.0))
+    noise = make_noise("isotropic", NoiseLevel(1.0, 1.0))
     plain = simulate_demonstration(tower, 1.0, 3)
-    salted = simulate_demonstration(tower, 1.0, 3, salt=HERE)
+    salted = simulate_demonstration(tower, 1.0, 3, secret_seed=HERE)
     assert not np.array_equal(plain.layout.goals, salted.layout.goals)
     off = [shown.demonstration.goals[1] - shown.layout.goals[1] for shown in (plain, salted)]
     assert not np.allclose(*off, rtol=0, atol=1e-5)
-    seen = [observe_demonstration(plain, noise, 3, salt) for salt in (None, HERE, THERE, HERE)]
+    seen = [observe_demonstration(plain, noise, 3, secret_seed) for secret_seed in (None, HERE, THERE, HERE)]
     assert not any(np.array_equal(seen[0].goals, other.goals) for other in seen[1:])
     np.testing.assert_array_equal(seen[1].goals, seen[3].goals)
     expected = noise(tower.scenario.assembly, plain.demonstration, stream(3, OBSERVATION, HERE))
@@ -76,32 +78,32 @@ def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
 
 
 def test_nothing_that_is_printed_or_written_shows_the_salt() -> None:
-    spec = TrialSettings("block_on_block", salt=HERE)
+    spec = TrialConfig("block_on_block", secret_seed=HERE)
     for text in (repr(spec), str(spec), repr(HERE), f"{HERE}", HERE.hash):
         assert HERE.secret.hex() not in text
         assert repr(HERE.secret)[2:-1] not in text
     with pytest.raises(TypeError, match="bytes is not JSON serializable"):
         json.dumps(asdict(spec))
-    assert pickle.loads(pickle.dumps(spec)) == spec != replace(spec, salt=THERE)
+    assert pickle.loads(pickle.dumps(spec)) == spec != replace(spec, secret_seed=THERE)
 
 
 def test_rows_of_two_salts_have_two_hashes() -> None:
-    specs = [TrialSettings("block_on_block", salt=salt) for salt in (None, HERE, THERE)]
-    assert len({spec_hash(spec, "content") for spec in specs}) == 3
-    again = TrialSettings("block_on_block", salt=Salt(HERE.secret), seed=9, method="paper")
-    assert spec_hash(again, "content") == spec_hash(specs[1], "content")
+    specs = [TrialConfig("block_on_block", secret_seed=secret_seed) for secret_seed in (None, HERE, THERE)]
+    assert len({config_hash(spec, "content") for spec in specs}) == 3
+    again = TrialConfig("block_on_block", secret_seed=SecretSeed(HERE.secret), seed=9, method="paper")
+    assert config_hash(again, "content") == config_hash(specs[1], "content")
 
 
 @pytest.mark.parametrize("end", ["", "\r\n"])
 def test_a_salt_file_is_one_line_of_hexadecimal_digits(tmp_path: Path, end: str) -> None:
-    path = tmp_path / "salt"
+    path = tmp_path / "secret_seed"
     path.write_bytes((HERE.secret.hex() + end).encode())
-    assert read_salt(path) == HERE
+    assert read_secret_seed(path) == HERE
     path.write_bytes((HERE.secret.hex().upper() + end).encode())
-    assert read_salt(path) == HERE
+    assert read_secret_seed(path) == HERE
     linked = tmp_path / "linked"
     linked.symlink_to(path)
-    assert read_salt(linked) == HERE
+    assert read_secret_seed(linked) == HERE
 
 
 @pytest.mark.parametrize(
@@ -116,10 +118,10 @@ def test_a_salt_file_is_one_line_of_hexadecimal_digits(tmp_path: Path, end: str)
     ],
 )
 def test_anything_else_is_no_salt_and_is_not_repeated(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "salt"
+    path = tmp_path / "secret_seed"
     path.write_bytes(content)
     with pytest.raises(InputError, match="is not a salt file; it must hold one line of 32 to 1024") as error:
-        read_salt(path)
+        read_secret_seed(path)
     assert len(content) < 20 or content.decode(errors="replace").strip() not in str(error.value)
 
 
@@ -130,40 +132,40 @@ def fifo(path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFOs here")
 @pytest.mark.parametrize("make", [fifo, Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
 def test_what_is_no_file_is_no_salt(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / "salt")
+    make(tmp_path / "secret_seed")
     with pytest.raises(InputError, match="was given; give a salt file"):
-        salt_of_sweep(tmp_path / "salt", tmp_path / "out")
+        secret_seed_of_sweep(tmp_path / "secret_seed", tmp_path / "out")
 
 
 def test_a_salt_is_made_once_for_its_owner_alone(tmp_path: Path) -> None:
-    path = tmp_path / "salt"
-    made = salt_of_sweep(path, tmp_path / "out")
+    path = tmp_path / "secret_seed"
+    made = secret_seed_of_sweep(path, tmp_path / "out")
     assert len(made.secret) == 32
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    assert os.listdir(tmp_path) == ["salt"]
-    assert salt_of_sweep(path, tmp_path / "out") == made
-    make_salt(path)
-    assert read_salt(path) == made
-    assert salt_of_sweep(tmp_path / "other", tmp_path / "out") != made
+    assert os.listdir(tmp_path) == ["secret_seed"]
+    assert secret_seed_of_sweep(path, tmp_path / "out") == made
+    make_secret_seed(path)
+    assert read_secret_seed(path) == made
+    assert secret_seed_of_sweep(tmp_path / "other", tmp_path / "out") != made
 
 
 def test_a_salt_is_not_made_through_a_link(tmp_path: Path) -> None:
-    (tmp_path / "salt").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "secret_seed").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(InputError, match="cannot be read"):
-        salt_of_sweep(tmp_path / "salt", tmp_path / "out")
-    make_salt(tmp_path / "salt")
-    assert os.listdir(tmp_path) == ["salt"]
+        secret_seed_of_sweep(tmp_path / "secret_seed", tmp_path / "out")
+    make_secret_seed(tmp_path / "secret_seed")
+    assert os.listdir(tmp_path) == ["secret_seed"]
 
 
 def test_a_salt_that_is_lost_is_not_made_again(tmp_path: Path) -> None:
-    out = write(tmp_path / "out", [row("none", 1, True)])
+    out = write(tmp_path / "out", [row("uncorrected", 1, True)])
     with pytest.raises(InputError, match=r"is not there, and .* holds trials already"):
-        salt_of_sweep(tmp_path / "salt", out)
-    assert not (tmp_path / "salt").exists()
+        secret_seed_of_sweep(tmp_path / "secret_seed", out)
+    assert not (tmp_path / "secret_seed").exists()
 
 
-def of_salt(salt: str | None, methods: tuple[str, ...] = ("none",)) -> list[dict[str, Any]]:
-    return [row(method, seed, seed % 2 == 0) | {"salt": salt} for method in methods for seed in range(6)]
+def of_salt(secret_seed: str | None, methods: tuple[str, ...] = ("uncorrected",)) -> list[dict[str, Any]]:
+    return [row(method, seed, seed % 2 == 0) | {"secret_seed": secret_seed} for method in methods for seed in range(6)]
 
 
 def test_rows_of_different_salts_are_neither_counted_nor_paired(tmp_path: Path) -> None:
@@ -184,64 +186,66 @@ def test_rows_of_different_salts_are_neither_counted_nor_paired(tmp_path: Path) 
 
 def test_the_report_says_which_salt_and_how_to_run_a_trial_again(tmp_path: Path) -> None:
     out = write(tmp_path / "out", of_salt(HERE.hash))
-    (tmp_path / "salt").write_text(THERE.secret.hex())
+    (tmp_path / "secret_seed").write_text(THERE.secret.hex())
     said = pages.words(report(out).page)
     assert HERE.hash in said
     assert "FILE in a command stands for its file" in said
     with pytest.raises(InputError, match=f"drawn with the salt {HERE.hash}, and the salt .* of {THERE.hash}; give"):
-        report(out, salt_file=tmp_path / "salt")
-    with pytest.raises(InputError, match="drawn without a salt; leave --salt-file out"):
-        report(write(tmp_path / "plain", of_salt(None)), salt_file=tmp_path / "salt")
+        report(out, secret_seed_file=tmp_path / "secret_seed")
+    with pytest.raises(InputError, match="drawn without a salt; leave --secret-seed-file out"):
+        report(write(tmp_path / "plain", of_salt(None)), secret_seed_file=tmp_path / "secret_seed")
     assert HERE.hash not in pages.words(report(tmp_path / "plain").page)
 
 
 def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["replay", "block_on_block", "--salt-file", str(tmp_path / "salt")]) == 2
+    assert cli.main(["replay", "block_on_block", "--secret-seed-file", str(tmp_path / "secret_seed")]) == 2
     assert "the salt file cannot be read (No such file or directory); check the path" in capsys.readouterr().err
-    assert not (tmp_path / "salt").exists()
-    assert cli.main(["replay", "block_on_block", "--observation", "seen.json", "--salt-file", "salt"]) == 2
-    assert "--salt-file was given together with --observation, which draws nothing" in capsys.readouterr().err
+    assert not (tmp_path / "secret_seed").exists()
+    assert (
+        cli.main(["replay", "block_on_block", "--observation", "seen.json", "--secret-seed-file", "secret_seed"]) == 2
+    )
+    assert "--secret-seed-file was given together with --observation, which draws nothing" in capsys.readouterr().err
 
 
 def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same rows in this process and in another one; resumed and replayed with its salt, which nothing shows."""
-    file = tmp_path / "salt"
+    file = tmp_path / "secret_seed"
     here = tmp_path / "here"
     there = tmp_path / "there"
-    rows = run_sweep(GRID, here, salt_file=file)
-    salt = read_salt(file)
+    rows = run_sweep(GRID, here, secret_seed_file=file)
+    secret_seed = read_secret_seed(file)
     assert len(rows) == 4
-    assert {one["salt"] for one in rows} == {salt.hash}
-    assert json.loads((here / "run.json").read_text())["salt"] == salt.hash
-    spread = run_sweep(GRID, there, salt_file=file, workers=1)
+    assert {one["secret_seed"] for one in rows} == {secret_seed.hash}
+    assert json.loads((here / "run.json").read_text())["secret_seed"] == secret_seed.hash
+    spread = run_sweep(GRID, there, secret_seed_file=file, workers=1)
     assert sorted(map(json.dumps, spread)) == sorted(map(json.dumps, rows))
     before = (here / "trials.jsonl").read_bytes()
-    assert run_sweep(GRID, here, salt_file=file) == rows
-    with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and no salt file was given; give"):
+    assert run_sweep(GRID, here, secret_seed_file=file) == rows
+    with pytest.raises(InputError, match=f"drawn with the salt {secret_seed.hash}, and no salt file was given; give"):
         run_sweep(GRID, here)
-    make_salt(tmp_path / "other")
-    with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and the salt file given is that of"):
-        run_sweep(GRID, here, salt_file=tmp_path / "other")
+    make_secret_seed(tmp_path / "other")
+    with pytest.raises(InputError, match=f"drawn with the salt {secret_seed.hash}, and the salt file given is that of"):
+        run_sweep(GRID, here, secret_seed_file=tmp_path / "other")
     assert (here / "trials.jsonl").read_bytes() == before
     capsys.readouterr()
     command = shlex.split(replay_command(rows[0]))[1:]
-    assert command[command.index("--salt-file") + 1] == "FILE"
+    assert command[command.index("--secret-seed-file") + 1] == "FILE"
     assert cli.main([word if word != "FILE" else str(file) for word in command] + ["--json"]) == 0
     assert json.loads(capsys.readouterr().out) == rows[0]
     report(here)
     for path in (*here.rglob("*"), *there.rglob("*")):
         if path.is_file():
             content = path.read_bytes()
-            assert salt.secret not in content
-            assert salt.secret.hex().encode() not in content.lower()
+            assert secret_seed.secret not in content
+            assert secret_seed.secret.hex().encode() not in content.lower()
 
 
 def test_pictures_are_of_the_salted_trial(tmp_path: Path) -> None:
-    grid = replace(GRID, levels=(0.0,), methods=("none",), trials=1)
-    (made,) = run_sweep(grid, tmp_path / "out", salt_file=tmp_path / "salt")
-    given = read_salt(tmp_path / "salt")
-    for salt, words in ((given, "run again for this"), (None, "was not given (--salt-file), so")):
-        (picture,), missed = failure_pictures([made], tmp_path / "out", salt=salt)
+    grid = replace(GRID, noise_level=(0.0,), method=("uncorrected",), trials=1)
+    (made,) = run_sweep(grid, tmp_path / "out", secret_seed_file=tmp_path / "secret_seed")
+    given = read_secret_seed(tmp_path / "secret_seed")
+    for secret_seed, words in ((given, "run again for this"), (None, "was not given (--secret-seed-file), so")):
+        (picture,), missed = failure_pictures([made], tmp_path / "out", secret_seed=secret_seed)
         assert words in picture.words
         assert not missed
 

@@ -8,17 +8,17 @@ import pytest
 
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.records import wrench_noise
+from apo_bench.records import ft_noise
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.probing.feeling import Feeling, touch_guard
+from apo_bench.simulation.execution.probing.feeling import ProbingState, touch_guard
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
 from apo_bench.simulation.execution.probing.touching import _stand_off, find_out
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
-from apo_bench.trial.trial import feels_of
+from apo_bench.trial.trial import probing_config
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 
@@ -44,7 +44,9 @@ def found_out(name, error, parts_at=None, stated=STATED):
     """What a robot believes once it has touched what is fixed."""
     start = plan(name).start if parts_at is None else parts_at
     robot = Robot(scene(name), start, None, "contact", error)
-    feeling = Feeling(feels_of(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error)
+    feeling = ProbingState(
+        probing_config(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error
+    )
     robot.wait(0.05)
     find_out(robot, feeling)
     return feeling.belief
@@ -66,8 +68,8 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
 def test_a_robot_that_may_be_far_off_begins_farther_away():
     def begins(stated):
         robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "contact")
-        feels = feels_of(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
-        stand_off = partial(_stand_off, robot, Feeling(feels, plan("peg_in_hole"), scene("peg_in_hole"), None))
+        probing = probing_config(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
+        stand_off = partial(_stand_off, robot, ProbingState(probing, plan("peg_in_hole"), scene("peg_in_hole"), None))
         found = (places(plan("peg_in_hole"), scene("peg_in_hole"), stand_off) for places in (floor_places, wall_places))
         return [[place.stand_off for place in each] for each in found]
 
@@ -88,8 +90,8 @@ def test_a_robot_that_is_as_far_off_as_it_was_told_feels_the_floor():
 def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
     name = "stick_in_tower"
     error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
-    feels = feels_of(plan(name), scene(name), "tool:1.2", (5,), "ideal")
-    outcome = replay(plan(name), scene(name), fidelity="contact", error=error, feels=feels).outcome
+    probing = probing_config(plan(name), scene(name), "tool:1.2", (5,), "ideal")
+    outcome = replay(plan(name), scene(name), fidelity="near-contact", error=error, probing=probing).outcome
     assert (outcome.stage, outcome.code, outcome.operation) == ("touch", "collision", None)
     assert outcome.sentence == (
         "the arm struck table while it touched what is fixed, before the first operation: it began 4.0 mm before what "
@@ -98,7 +100,7 @@ def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_a
 
 
 def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
-    felt = felt_noise(wrench_noise("10/5"), low_pass_part())
+    felt = felt_noise(ft_noise("10/5"), low_pass_part())
     assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 
@@ -123,8 +125,10 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     slips = np.tile(np.eye(4), (2, 1, 1))
     slips[1] = pose.at((0.0, 0.0006, 0.0), (1.7, 0.0, 0.0))
     error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
-    feels = feels_of(plan(name), scene(name), "in_hand:0.5/1", (6,))
-    felt = replay_and_judge(plan(name), scene(name), plan(name).goals, fidelity="contact", error=error, feels=feels)
+    probing = probing_config(plan(name), scene(name), "in_hand:0.5/1", (6,))
+    felt = replay_and_judge(
+        plan(name), scene(name), plan(name).goals, fidelity="near-contact", error=error, probing=probing
+    )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
 
@@ -169,9 +173,9 @@ def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
     name = "stick_in_tower"
     error = drawn(name, "hand_eye:0.5/0.1+in_hand:0.3/1", 4)
     goals = plan(name).goals
-    blind = replay_and_judge(plan(name), scene(name), goals, fidelity="contact", error=error)
-    feels = feels_of(plan(name), scene(name), "hand_eye:0.5/0.1+in_hand:0.3/1", (6,))
-    felt = replay_and_judge(plan(name), scene(name), goals, fidelity="contact", error=error, feels=feels)
+    blind = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error)
+    probing = probing_config(plan(name), scene(name), "hand_eye:0.5/0.1+in_hand:0.3/1", (6,))
+    felt = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error, probing=probing)
     assert not blind.verdict.success
     assert felt.verdict.success
     assert felt.result.felt.touches == 7

@@ -17,8 +17,8 @@ from apo_bench import (
     InputError,
     Observation,
     Scene,
-    SweepSettings,
-    TrialSettings,
+    SweepConfig,
+    TrialConfig,
     build_scene,
     load_scenario,
     run_sweep,
@@ -53,16 +53,16 @@ def scene(name: str) -> Scene:
 
 @cache
 def _watched(name: str, seed: int) -> SimulatedDemonstration:
-    return simulate_demonstration(scene(name), 1.0, seed, "range")
+    return simulate_demonstration(scene(name), 1.0, seed, "depth-camera")
 
 
 def watched(name: str, seed: int = 3) -> SimulatedDemonstration:
     return _watched(name, seed)
 
 
-def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
+def observed(name: str, noise_mm: float, seed: int = 3) -> Observation:
     simulated = watched(name, seed)
-    return observe_demonstration(simulated, range_sensor(scene(name), simulated, level_mm), seed)
+    return observe_demonstration(simulated, range_sensor(scene(name), simulated, noise_mm), seed)
 
 
 def errors(name: str, seen: Observation, seed: int = 3) -> Array:
@@ -144,12 +144,12 @@ def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> N
 
 
 def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
-    one, again, two = (observed("stick_in_tower", level) for level in (1.0, 1.0, 2.0))
+    one, again, two = (observed("stick_in_tower", noise_level) for noise_level in (1.0, 1.0, 2.0))
     assert one.goals.tobytes() == again.goals.tobytes()
     assert one.covariance.tobytes() == again.covariance.tobytes()
     assert (one.goals != two.goals).any()
     assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
-    fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "range").images
+    fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "depth-camera").images
     known = watched("stick_in_tower").images
     assert fresh is not None
     assert known is not None
@@ -163,8 +163,8 @@ def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
     simulated = watched("stick_in_tower", seed)
     moved = (simulated.demonstration.final["castle2"] - simulated.demonstration.goals[1])[:3, 3]
     assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
-    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
-    events = eye.events(simulated.demonstration, eye.sensed(stream(seed, OBSERVATION)))
+    pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    events = pose_source.events(simulated.demonstration, pose_source.sensed(stream(seed, OBSERVATION)))
     assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
     seen = observed("stick_in_tower", 1.0, seed)
     away = (seen.goals[1] - simulated.demonstration.goals[1])[:3, 3]
@@ -177,8 +177,8 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
     assembly = simulated.demonstration.assembly
     short = replace(assembly.solids["stick"], pieces=assembly.solids["castle1"].pieces)
     wrong = replace(assembly, solids={**assembly.solids, "stick": short})
-    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
-    seen = eye(wrong, replace(simulated.demonstration, assembly=wrong), stream(3, OBSERVATION))
+    pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    seen = pose_source(wrong, replace(simulated.demonstration, assembly=wrong), stream(3, OBSERVATION))
     assert seen.seen.tolist() == [True, True, False]
     assert seen.covariance[2][0, 0] > 0.005
     assert np.array_equal(seen.goals[2], simulated.layout.start["stick"])
@@ -186,22 +186,22 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
 
 def test_an_operation_that_no_image_shows_is_not_seen() -> None:
     simulated = watched("stick_in_tower")
-    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
-    blind = replace(eye, images=eye.images[:2])
+    pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    blind = replace(pose_source, images=pose_source.images[:2])
     seen = observe_demonstration(simulated, blind, 3)
     assert seen.seen.tolist() == [True, False, False]
-    none = replace(eye, images=eye.images[:1])
+    none = replace(pose_source, images=pose_source.images[:1])
     assert not observe_demonstration(simulated, none, 3).seen.any()
 
 
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
     shown = watched("stick_in_tower")
-    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
+    pose_source = range_sensor(scene("stick_in_tower"), shown, 1.0)
     S = symmetries(shown.demonstration.assembly.solids["stick"])[3]
-    turned = np.array(eye.turns)
+    turned = np.array(pose_source.turns)
     turned[2] = turned[2] @ S[:3, :3]
-    other = replace(eye, turns=turned)
-    a, b = (e(shown.demonstration.assembly, shown.demonstration, stream(3, OBSERVATION)) for e in (eye, other))
+    other = replace(pose_source, turns=turned)
+    a, b = (e(shown.demonstration.assembly, shown.demonstration, stream(3, OBSERVATION)) for e in (pose_source, other))
     assert np.array_equal(a.goals[:2], b.goals[:2])
     assert b.goals[2] == pytest.approx(a.goals[2] @ S, abs=1e-9)
     assert sorted(np.linalg.eigvalsh(b.covariance[2])) == pytest.approx(
@@ -210,15 +210,15 @@ def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
 
 
 def test_a_trial_through_the_range_finder() -> None:
-    spec = TrialSettings("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
+    spec = TrialConfig("stick_in_tower", noise_mm=1.0, pose_source="depth-camera", method="contact", seed=3)
     row = run_trial(spec, scene("stick_in_tower"), simulated=watched("stick_in_tower"))
-    assert row["eye"] == "range"
+    assert row["pose_source"] == "depth-camera"
     assert row["success"] is True
 
 
 def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "eye.png"
-    assert main(["eye", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
+    assert main(["pose_source", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
     form = json.loads(capsys.readouterr().out)
     assert form["schema"] == "apo-bench/eye/1"
     assert [operation["found"] for operation in form["operations"]] == [True, True]
@@ -242,9 +242,29 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ["--eye", "range", "--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1"]
+    asked = [
+        "--pose-source",
+        "depth-camera",
+        "--noise-level",
+        "0.5",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected,contact",
+        "--trials",
+        "1",
+    ]
     out = tmp_path / "run"
-    more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--fidelity", "contact", "--out", str(out)]
+    more = [
+        "--contact-source",
+        "detected",
+        "--clearance-mm",
+        "0.25,0.3",
+        "--fidelity",
+        "near-contact",
+        "--out",
+        str(out),
+    ]
     assert main(["sweep", "block_on_block", *asked, *more]) == 0
     assert main(["report", str(out)]) == 0
     said = capsys.readouterr().out
@@ -258,19 +278,30 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
         assert not [text for text in texts if "deg" in text or "range noise" in text], name
     for name in ("success_over_level", "gap_before_and_after"):
         assert {"level: mm per ray", "0.5"} <= set(drawn[name])
-    assert "0.5 mm per ray" in drawn["recognised"]
+    assert "0.5 mm per ray" in drawn["detected"]
     assert "range finder, relations recognised" in " ".join(drawn["success_over_level"])
 
 
 def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
-    options = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
+    options = [
+        "--pose-source",
+        "noise,range",
+        "--noise-level",
+        "1",
+        "--human-error-scale",
+        "0",
+        "--method",
+        "uncorrected",
+        "--trials",
+        "1",
+    ]
     out = tmp_path / "run"
     for _ in range(2):
         assert main(["sweep", "block_on_block", *options, "--workers", "1", "--out", str(out)]) == 0
         rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
-        assert sorted((row["eye"], row["noise"], row["level_deg"]) for row in rows) == [
-            ("noise", "isotropic", 1.0),
-            ("range", "range", 0.0),
+        assert sorted((row["pose_source"], row["noise"], row["noise_deg"]) for row in rows) == [
+            ("noise-model", "isotropic", 1.0),
+            ("depth-camera", "depth-camera", 0.0),
         ]
     assert main(["report", str(out)]) == 0
     axis = "level: mm and degrees per axis; level: mm per ray"
@@ -282,7 +313,7 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        *(["--level", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
+        *(["--noise-level", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
     ],
 )
 def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
@@ -291,7 +322,7 @@ def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     monkeypatch.setattr(
         "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
-    assert main(["eye", "block_on_block", *wrong]) == 2
+    assert main(["pose_source", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
     assert said
     assert "Traceback" not in said
@@ -303,37 +334,39 @@ def test_noise_models_are_refused_where_only_the_range_finder_looks(
     noise: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    assert main(["sweep", "block_on_block", "--eye", "range", "--noise", noise, "--out", str(out)]) == 2
-    assert "was given together with the eye 'range', which draws no pose noise" in capsys.readouterr().err
+    assert main(["sweep", "block_on_block", "--pose-source", "depth-camera", "--noise", noise, "--out", str(out)]) == 2
+    assert "was given together with the eye 'depth-camera', which draws no pose noise" in capsys.readouterr().err
     assert not out.exists()
     with pytest.raises(InputError, match="draws no pose noise"):
-        SweepSettings(("block_on_block",), eyes=("range",), noises=tuple(noise.split(",")))
+        SweepConfig(("block_on_block",), pose_source=("depth-camera",), noise=tuple(noise.split(",")))
     with pytest.raises(InputError, match="draws no pose noise"):
-        gymnasium.make("APOReplay-v0", eye="range", noise=noise.split(",")[0])
+        gymnasium.make("APOReplay-v0", pose_source="depth-camera", noise=noise.split(",")[0])
 
 
 def test_what_draws_noise_depends_on_the_eyes() -> None:
-    assert SweepSettings(("block_on_block",), eyes=("range",)).noises == ()
-    assert SweepSettings(("block_on_block",)).noises == ("isotropic",)
-    assert SweepSettings(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
-    assert SweepSettings(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
+    assert SweepConfig(("block_on_block",), pose_source=("depth-camera",)).noise == ()
+    assert SweepConfig(("block_on_block",)).noise == ("isotropic",)
+    assert SweepConfig(("block_on_block",), pose_source=("depth-camera", "noise-model")).noise == ("isotropic",)
+    assert SweepConfig(("block_on_block",), pose_source=("depth-camera", "noise-model"), noise=("camera",)).noise == (
+        "camera",
+    )
     with pytest.raises(InputError, match="draws no pose noise"):
-        TrialSettings("block_on_block", eye="range", noise="camera")
+        TrialConfig("block_on_block", pose_source="depth-camera", noise="camera")
 
 
-@pytest.mark.parametrize("eye", [3, "rang"])
-def test_what_is_no_eye_is_refused(eye: Any) -> None:
+@pytest.mark.parametrize("pose_source", [3, "rang"])
+def test_what_is_no_eye_is_refused(pose_source: Any) -> None:
     with pytest.raises(InputError, match=r"unknown eye .* Known: noise, range\.|eye of APOReplay must be a text"):
-        gymnasium.make("APOReplay-v0", eye=eye)
+        gymnasium.make("APOReplay-v0", pose_source=pose_source)
 
 
-@pytest.mark.parametrize("level", [(1.0, 1.0)])
-def test_the_level_of_the_range_finder_is_one_number(level: Any) -> None:
+@pytest.mark.parametrize("noise_level", [(1.0, 1.0)])
+def test_the_level_of_the_range_finder_is_one_number(noise_level: Any) -> None:
     with pytest.raises(InputError, match=r"mm per ray|level of APOReplay must be a number or a list"):
-        gymnasium.make("APOReplay-v0", eye="range", level=level)
+        gymnasium.make("APOReplay-v0", pose_source="depth-camera", noise_level=noise_level)
 
 
-@pytest.mark.parametrize("careless", [None, "much", float("nan")])
-def test_carelessness_is_a_number(careless: Any) -> None:
+@pytest.mark.parametrize("human_error_scale", [None, "much", float("nan")])
+def test_carelessness_is_a_number(human_error_scale: Any) -> None:
     with pytest.raises(InputError, match=r"a number from 0 to 10 is allowed|careless of APOReplay must be a number"):
-        gymnasium.make("APOReplay-v0", careless=careless)
+        gymnasium.make("APOReplay-v0", human_error_scale=human_error_scale)

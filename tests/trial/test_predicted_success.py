@@ -1,4 +1,4 @@
-"""A plan promises how likely it is to succeed, from what its planner knew; below `abstain` nothing moves."""
+"""A plan promises how likely it is to succeed, from what its planner knew; below `min_predicted_success` nothing moves."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.assembly import Hypothesis, Observation
 from apo_bench.benchmark.analysis import tally
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
-from apo_bench.records import Row
+from apo_bench.records import TrialRecord
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.promise import Explanation, abstained, drawn_truths, promised_success
-from apo_bench.trial.promise_table import RATES, SCORES
+from apo_bench.trial.predicted_success import Explanation, abstained, drawn_truths, predict_success
+from apo_bench.trial.predicted_success_table import RATES, SCORES
 from apo_bench.trial.robot_draws import brought
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
@@ -43,11 +43,11 @@ def simulated(scene: Scene) -> SimulatedDemonstration:
     return simulate_demonstration(scene, 1.0, SEED)
 
 
-def asked(**more: Any) -> TrialSettings:
-    return TrialSettings(SCENARIO, **({"seed": SEED, "fidelity": "contact", "method": "contact"} | more))
+def asked(**more: Any) -> TrialConfig:
+    return TrialConfig(SCENARIO, **({"seed": SEED, "fidelity": "near-contact", "method": "contact"} | more))
 
 
-def row(scene: Scene, simulated: SimulatedDemonstration, **more: Any) -> Row:
+def row(scene: Scene, simulated: SimulatedDemonstration, **more: Any) -> TrialRecord:
     return run_trial(asked(**more), scene, simulated=simulated)
 
 
@@ -60,8 +60,8 @@ def test_the_table_never_falls() -> None:
 def test_the_same_trial_promises_the_same_bytes(scene: Scene, simulated: SimulatedDemonstration) -> None:
     one, two = (json.dumps(row(scene, simulated, robot_error="hand_eye:0.2/0.05")) for _ in range(2))
     assert one == two
-    promised = json.loads(one)["promised"]
-    assert 0.0 <= promised <= 1.0
+    predicted_success = json.loads(one)["predicted_success"]
+    assert 0.0 <= predicted_success <= 1.0
 
 
 def test_a_promise_never_sees_the_truth(scene: Scene, simulated: SimulatedDemonstration) -> None:
@@ -69,24 +69,24 @@ def test_a_promise_never_sees_the_truth(scene: Scene, simulated: SimulatedDemons
     off = pose.at((0.0, 0.0, 0.03), (0.0, 0.0, 40.0))
     elsewhere = replace(simulated, layout=replace(simulated.layout, goals=simulated.layout.goals @ off))
     right, wrong = row(scene, simulated), row(scene, elsewhere)
-    assert right["promised"] == wrong["promised"]
+    assert right["predicted_success"] == wrong["predicted_success"]
     assert wrong["planned_error_fixed_mm"] > 10.0 > right["planned_error_fixed_mm"]
 
 
 def test_what_is_seen_worse_and_not_corrected_promises_less(scene: Scene) -> None:
     careful = simulate_demonstration(scene, 0.0, SEED)
-    promised = []
-    for level in (0.0, 0.1, 0.5, 4.0):
-        settings = asked(level_mm=level, level_deg=level)
+    predicted_success = []
+    for noise_level in (0.0, 0.1, 0.5, 4.0):
+        settings = asked(noise_mm=noise_level, noise_deg=noise_level)
         means = []
         for seed in range(4):
             seen = observe_demonstration(careful, noise_of(settings, scene, careful), seed)
-            planned = apply_method("none", seen, None, where=scene)
+            planned = apply_method("uncorrected", seen, None, where=scene)
             assert planned.plan is not None
-            means.append(promised_success(planned.plan, seen, None, scene.scenario))
-        promised.append(float(np.mean(means)))
-    assert promised == sorted(promised, reverse=True)
-    assert promised[0] - promised[-1] > 0.3
+            means.append(predict_success(planned.plan, seen, None, scene.scenario))
+        predicted_success.append(float(np.mean(means)))
+    assert predicted_success == sorted(predicted_success, reverse=True)
+    assert predicted_success[0] - predicted_success[-1] > 0.3
 
 
 def test_a_robot_that_is_further_off_promises_less(scene: Scene, simulated: SimulatedDemonstration) -> None:
@@ -94,9 +94,9 @@ def test_a_robot_that_is_further_off_promises_less(scene: Scene, simulated: Simu
     planned = apply_method("contact", seen, None, where=scene)
     assert planned.plan is not None
     errors = ("none", "hand_eye:0.1/0.02", "hand_eye:1/0.2", "hand_eye:10/2")
-    promised = [promised_success(planned.plan, seen, planned.correction, scene, error) for error in errors]
-    assert promised == sorted(promised, reverse=True)
-    assert promised[0] > promised[-1]
+    predicted_success = [predict_success(planned.plan, seen, planned.correction, scene, error) for error in errors]
+    assert predicted_success == sorted(predicted_success, reverse=True)
+    assert predicted_success[0] > predicted_success[-1]
 
 
 def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
@@ -106,13 +106,13 @@ def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
     planned = apply_method("contact", seen, None, where=scene)
     assert planned.plan is not None
 
-    def promised(error: str) -> float:
+    def predicted_success(error: str) -> float:
         assert planned.plan is not None
-        return promised_success(planned.plan, seen, planned.correction, scene, error, True, True)
+        return predict_success(planned.plan, seen, planned.correction, scene, error, True, True)
 
-    right = promised("none")
-    assert promised("hand_eye:1/0.2+tool:0.5") == right
-    assert promised("in_hand:0/20") < right
+    right = predicted_success("uncorrected")
+    assert predicted_success("hand_eye:1/0.2+tool:0.5") == right
+    assert predicted_success("in_hand:0/20") < right
 
 
 def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
@@ -124,7 +124,7 @@ def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
     plan = correct(seen, "contact").plan(seen)
     error = draw_robot_error(error_name, pocket, SEED)
     assert error is not None
-    reached = replay(plan, pocket, fidelity="contact", error=error).reached
+    reached = replay(plan, pocket, fidelity="near-contact", error=error).reached
     states = brought(plan, pocket, error)
     resting = [snapshot for snapshot in reached.after if snapshot is not None]
     for before, state, operation in zip(resting, states[1:], plan.assembly.operations[1:], strict=False):
@@ -137,7 +137,7 @@ def test_the_likelier_a_rival_whose_contacts_the_plan_breaks_the_less_it_promise
     scene: Scene, simulated: SimulatedDemonstration
 ) -> None:
     """A goal half a millimetre beside its contacts: right if they are wrong, and wrong if they hold."""
-    seen = observe_demonstration(simulated, noise_of(asked(level_mm=0.1, level_deg=0.1), scene, simulated), SEED)
+    seen = observe_demonstration(simulated, noise_of(asked(noise_mm=0.1, noise_deg=0.1), scene, simulated), SEED)
     correction = correct(seen, "contact")
     last = len(seen.assembly) - 1
     relations = seen.assembly.relations()
@@ -146,14 +146,14 @@ def test_the_likelier_a_rival_whose_contacts_the_plan_breaks_the_less_it_promise
     aside = correction.goals.copy()
     aside[last, :3, 3] += 0.0005
     plan = correction.plan(seen).with_goals(aside)
-    promised = []
+    predicted_success = []
     for weight in (0.99, 0.8, 0.5, 0.1):
         without = Hypothesis(weight, aside, correction.covariance, seen, (), dropped)
         holding = Hypothesis(1.0 - weight, correction.goals, correction.covariance, seen)
         torn = replace(correction, goals=aside, hypotheses=(without, holding))
-        promised.append(promised_success(plan, seen, torn, scene.scenario))
-    assert promised == sorted(promised, reverse=True)
-    assert promised[0] - promised[-1] > 0.2
+        predicted_success.append(predict_success(plan, seen, torn, scene.scenario))
+    assert predicted_success == sorted(predicted_success, reverse=True)
+    assert predicted_success[0] - predicted_success[-1] > 0.2
 
 
 def test_where_nothing_was_seen_nobody_knows_which_way_all_of_it_is_turned() -> None:
@@ -171,7 +171,7 @@ def test_where_nothing_was_seen_nobody_knows_which_way_all_of_it_is_turned() -> 
     assert correction.ok
     plan = correction.plan(nothing)
     turned, right = (
-        promised_success(plan, replace(nothing, seen=np.full(n, seen)), correction, known) for seen in (False, True)
+        predict_success(plan, replace(nothing, seen=np.full(n, seen)), correction, known) for seen in (False, True)
     )
     assert turned < 0.6 < 0.8 < right
 
@@ -179,7 +179,7 @@ def test_where_nothing_was_seen_nobody_knows_which_way_all_of_it_is_turned() -> 
 def test_truths_are_drawn_where_contacts_hold(scene: Scene, simulated: SimulatedDemonstration) -> None:
     from apo_bench.assembly import largest_gap
 
-    seen = observe_demonstration(simulated, noise_of(asked(level_mm=0.1, level_deg=0.1), scene, simulated), SEED)
+    seen = observe_demonstration(simulated, noise_of(asked(noise_mm=0.1, noise_deg=0.1), scene, simulated), SEED)
     correction = correct(seen, "contact")
     truths = drawn_truths(Explanation(1.0, seen, correction.goals), 8, np.random.default_rng(0))
     gaps = [largest_gap(seen.assembly, seen.start, goals) for goals in truths]
@@ -191,12 +191,12 @@ def test_below_abstain_the_arm_never_moves(
     scene: Scene, simulated: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     carried_out = row(scene, simulated)
-    least = min(1.0, carried_out["promised"] + 1e-6)
+    least = min(1.0, carried_out["predicted_success"] + 1e-6)
     monkeypatch.setattr(trial, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
-    kept = row(scene, simulated, abstain=least)
+    kept = row(scene, simulated, min_predicted_success=least)
     assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
-    assert (kept["sim_seconds"], kept["reached"]) == (None, None)
-    assert kept["promised"] == carried_out["promised"]
+    assert (kept["sim_time_s"], kept["reached"]) == (None, None)
+    assert kept["predicted_success"] == carried_out["predicted_success"]
 
 
 def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
@@ -206,7 +206,7 @@ def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
 
 
 def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, simulated: SimulatedDemonstration) -> None:
-    done = row(scene, simulated, abstain=0.01)
+    done = row(scene, simulated, min_predicted_success=0.01)
     kept = done | {
         "seed": SEED + 1,
         "success": False,
@@ -214,11 +214,11 @@ def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, sim
         "loose_success": False,
         "failure_stage": "promise",
         "failure_code": "abstained",
-        "promised": 0.005,
+        "predicted_success": 0.005,
     }
     (cell,) = tally([done, kept])
     assert (cell.trials, cell.successes, cell.rate) == (2, 1, 0.5)
     assert (cell.abstained, cell.not_executed, cell.executed.trials) == (1, 1, 1)
     assert cell.wrong_when_executed == 0.0
-    assert cell.promised == pytest.approx((done["promised"] + 0.005) / 2)
-    assert cell.brier == pytest.approx((1.0 - done["promised"]) ** 2)
+    assert cell.predicted_success == pytest.approx((done["predicted_success"] + 0.005) / 2)
+    assert cell.brier == pytest.approx((1.0 - done["predicted_success"]) ** 2)

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Assembly, InputError, correct
 from apo_bench.assembly import Contact, PartFace
-from apo_bench.perception.observation.relations import Shifted, culprit, false, missed, with_relations
+from apo_bench.perception.observation.wrong_contacts import Shifted, culprit, false, missed, with_contacts
 from tests import rounds, scenes
 from tests.brackets import on_pins
 
@@ -100,4 +100,4 @@ def test_relations_of_ones_own_must_be_possible(face: str, words: str) -> None:
         return replace(assembly, operations=tuple(operations))
 
     with pytest.raises(InputError, match=words):
-        with_relations(seen, told, scene.goals, np.random.default_rng(0))
+        with_contacts(seen, told, scene.goals, np.random.default_rng(0))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench import Observation, Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench import Observation, Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.trial.planning import apply_method, goals_by_heart
@@ -62,7 +62,7 @@ def test_operations_that_were_not_seen_are_left_out() -> None:
     goals[1, :3, 3] += 1.0
     partly = replace(seen(goals), seen=np.array([True, False, True]))
     np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, partly), layout.goals, rtol=0, atol=1e-6)
-    nothing = apply_method("by-heart", replace(partly, seen=np.zeros(3, dtype=bool)), None, where=SCENARIO)
+    nothing = apply_method("nominal", replace(partly, seen=np.zeros(3, dtype=bool)), None, where=SCENARIO)
     assert nothing.plan is None
     assert nothing.failure is not None
     assert nothing.failure.code == "not_seen"
@@ -75,8 +75,10 @@ def scene() -> Scene:
 
 def test_a_tower_that_may_stand_anywhere_is_built_by_heart(scene: Scene) -> None:
     """At 4 mm and degrees: no part is where it was shown, and the assembly is right in itself."""
-    asked = TrialSettings("stick_in_tower", 4.0, 4.0, careless=0.0, method="by-heart", seed=1, fidelity="contact")
+    asked = TrialConfig(
+        "stick_in_tower", 4.0, 4.0, human_error_scale=0.0, method="nominal", seed=1, fidelity="near-contact"
+    )
     row = run_trial(asked, scene)
     assert (row["success"], row["as_demonstrated"]) == (True, True)
     assert row["planned_error_fixed_mm"] > 0.0
-    assert (row["gap_after_mm"] < 1e-6, row["freed"], row["tried"]) == (True, [], [])
+    assert (row["gap_after_mm"] < 1e-6, row["corrected_operations"], row["tried_corrections"]) == (True, [], [])

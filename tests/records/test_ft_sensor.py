@@ -5,22 +5,22 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import InputError
-from apo_bench.records import checked_wrench, wrench_noise
+from apo_bench.records import checked_ft_sensor, ft_noise
 
 
 @pytest.mark.parametrize(
     ("given", "spelled", "noise"),
     [
         ("ideal", "ideal", (0.0, 0.0)),
-        ("0.10", "external", (0.1, 0.005)),
-        (".2/.01", "external-coarse", (0.2, 0.01)),
-        ("cobot", "cobot", (3.5, 0.2)),
+        ("0.10", "wrist", (0.1, 0.005)),
+        (".2/.01", "wrist-coarse", (0.2, 0.01)),
+        ("joint-torque", "joint-torque", (3.5, 0.2)),
         ("0.5", "0.5/0.025", (0.5, 0.025)),
     ],
 )
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, noise: tuple[float, float]) -> None:
-    assert checked_wrench(given) == spelled == checked_wrench(spelled)
-    assert wrench_noise(given) == noise == wrench_noise(spelled)
+    assert checked_ft_sensor(given) == spelled == checked_ft_sensor(spelled)
+    assert ft_noise(given) == noise == ft_noise(spelled)
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, 
     [
         (
             "cobott",
-            "unknown wrench sensor 'cobott'; did you mean 'cobot'? Known: cobot, external, external-coarse, ide",
+            "unknown wrench sensor 'cobott'; did you mean 'joint-torque'? Known: cobot, external, external-coarse, ide",
         ),
         ("-1", "the wrench sensor '-1' was given; standard deviations from 0 to 10 N and from 0 to 5 Nm are allowed"),
         ("0.1/nan", "the wrench sensor '0.1/nan' was given;"),
@@ -36,6 +36,6 @@ def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, 
 )
 def test_what_is_no_wrench_sensor_is_one_sentence(given: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
-        checked_wrench(given)
+        checked_ft_sensor(given)
     assert str(refused.value).startswith(said)
     assert "\n" not in str(refused.value)

@@ -14,24 +14,29 @@ from apo_bench.benchmark.report.tables.methods import felt_table
 from tests.benchmark.analysis.test_rates import row
 
 
-def by_touch(seed: int, mm: float, method: str = "contact+feel", **more: Any) -> dict[str, Any]:
-    sizes = {"felt_mm": mm, "felt_deg": 0.1, "felt_sure_mm": 0.2, "felt_sure_deg": 0.05}
-    given = {"wrench": "external", "stated_error": "drawn", "robot_error": "hand_eye:0.5/0.1+tool:1"}
-    return {**row(method, seed), **given, **sizes, "touches": 6 + seed, "touches_refused": seed, **more}
+def probe(seed: int, mm: float, method: str = "contact+probe", **more: Any) -> dict[str, Any]:
+    sizes = {
+        "base_error_estimate_mm": mm,
+        "base_error_estimate_deg": 0.1,
+        "base_error_std_mm": 0.2,
+        "base_error_std_deg": 0.05,
+    }
+    given = {"ft_sensor": "wrist", "assumed_robot_error": "matched", "robot_error": "hand_eye:0.5/0.1+tool:1"}
+    return {**row(method, seed), **given, **sizes, "probe_contacts": 6 + seed, "probe_contacts_rejected": seed, **more}
 
 
 def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> None:
-    (found,) = felt([by_touch(0, 0.3), by_touch(1, 0.4), row("contact")])
+    (found,) = felt([probe(0, 0.3), probe(1, 0.4), row("contact")])
     assert (found["trials"], found["touches"], found["refused"]) == (2, 6.5, 1)
-    assert found["felt_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
+    assert found["base_error_estimate_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
     assert (found["sure_mm"], found["sure_deg"]) == pytest.approx((0.2, 0.05))
     assert found["drawn_mm"] == found["stated_mm"] == pytest.approx(math.sqrt(3) * 0.5)
     assert found["drawn_deg"] == found["stated_deg"] == pytest.approx(math.sqrt(3) * 0.1)
 
 
-@pytest.mark.parametrize(("stated", "told"), [("unstated", None), ("tool:1", (0.0, 0.0)), ("drawn", (0.866, 0.173))])
+@pytest.mark.parametrize(("stated", "told"), [("unknown", None), ("tool:1", (0.0, 0.0)), ("matched", (0.866, 0.173))])
 def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
-    (found,) = felt([by_touch(0, 0.3, stated_error=stated)])
+    (found,) = felt([probe(0, 0.3, assumed_robot_error=stated)])
     said = (found["stated_mm"], found["stated_deg"])
     assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
     (line,) = felt_table((found,)).lines
@@ -45,22 +50,22 @@ def test_where_no_robot_felt_one_sentence_says_so() -> None:
 
 
 def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None:
-    rows = [by_touch(0, 0.3, wrench=wrench) for wrench in ("cobot", "external")]
+    rows = [probe(0, 0.3, ft_sensor=ft_sensor) for ft_sensor in ("joint-torque", "wrist")]
     plain = {**row("contact"), "robot_error": rows[0]["robot_error"]}
     cells = tally([*rows, plain])
-    assert [(cell.method, cell.wrench) for cell in cells] == [
-        ("contact", "external"),
-        ("contact+feel", "external"),
-        ("contact+feel", "cobot"),
+    assert [(cell.method, cell.ft_sensor) for cell in cells] == [
+        ("contact", "wrist"),
+        ("contact+probe", "wrist"),
+        ("contact+probe", "joint-torque"),
     ]
     groups = members(settings(cells), cells)
-    assert sorted((s.wrench, tuple(cell.method for cell in own)) for s, own in groups.items()) == [
-        ("cobot", ("contact", "contact+feel")),
-        ("external", ("contact", "contact+feel")),
+    assert sorted((s.ft_sensor, tuple(cell.method for cell in own)) for s, own in groups.items()) == [
+        ("joint-torque", ("contact", "contact+probe")),
+        ("wrist", ("contact", "contact+probe")),
     ]
-    assert ["wrench cobot" in s.title for s in groups] == [s.wrench == "cobot" for s in groups]
-    assert place_of_reference(cells[2], "none").wrench == "external"
+    assert ["wrench cobot" in s.title for s in groups] == [s.ft_sensor == "joint-torque" for s in groups]
+    assert place_of_reference(cells[2], "uncorrected").ft_sensor == "wrist"
     table = cell_table(cells)
-    shown = [column.head for column in table.shown].index("wrench")
-    assert [line[shown] for line in table.lines] == ["any", "external", "cobot"]
-    assert "stated_error" not in [column.head for column in table.shown]
+    shown = [column.head for column in table.shown].index("ft_sensor")
+    assert [line[shown] for line in table.lines] == ["any", "wrist", "joint-torque"]
+    assert "assumed_robot_error" not in [column.head for column in table.shown]

@@ -27,7 +27,7 @@ _TEXT = "one line of 32 to 1024 hexadecimal digits, an even number of them, draw
 
 @final
 @dataclass(frozen=True)
-class Salt:
+class SecretSeed:
     """Known to the processes that run trials, and written to no file but its own."""
 
     secret: bytes = field(repr=False)
@@ -43,7 +43,7 @@ class Salt:
         return [int(word) for word in np.frombuffer(digest, dtype=">u4")]
 
 
-def read_salt(path: str | Path) -> Salt:
+def read_secret_seed(path: str | Path) -> SecretSeed:
     """The salt of a file.
 
     Raises:
@@ -55,28 +55,28 @@ def read_salt(path: str | Path) -> Salt:
         FEWEST_BYTES <= len(secret) <= _MOST_BYTES and len(set(secret)) >= _FEWEST_DIFFERENT,
         f"'{path}' is not a salt file; it must hold {_TEXT}.",
     )
-    return Salt(secret)
+    return SecretSeed(secret)
 
 
-def salt_of_sweep(path: str | Path, folder: str | Path) -> Salt:
+def secret_seed_of_sweep(path: str | Path, folder: str | Path) -> SecretSeed:
     """The salt of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
 
     Raises:
         InputError: The file is no salt, cannot be read, or cannot be made.
     """
     if os.path.lexists(path):
-        return read_salt(path)
+        return read_secret_seed(path)
     trials = Path(folder) / "trials.jsonl"
     require(
         not trials.exists() or trials.stat().st_size <= 0,
         f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
         "were drawn with, or choose another folder.",
     )
-    make_salt(Path(path))
-    return read_salt(path)
+    make_secret_seed(Path(path))
+    return read_secret_seed(path)
 
 
-def make_salt(path: Path) -> None:
+def make_secret_seed(path: Path) -> None:
     """Write 256 random bits to a file that only its owner can read; a file that is there by then is left as it is.
 
     Raises:
@@ -85,21 +85,21 @@ def make_salt(path: Path) -> None:
     write_file(path, f"{secrets.token_hex(32)}\n", private=True, over=False)
 
 
-def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
+def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:
     """The hash of the salt that all rows were drawn with; None for none.
 
     Raises:
         InputError: They were drawn with several.
     """
-    hashes = sorted({row.get("salt") or "" for row in rows})
+    hashes = sorted({row.get("secret_seed") or "" for row in rows})
     require(
         len(hashes) <= 1,
-        f"the rows were drawn {' and '.join(map(with_salt, hashes))}; count trials of one salt at a time.",
+        f"the rows were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one salt at a time.",
     )
     return hashes[0] or None if hashes else None
 
 
-def check_same_salt(holder: str, at_hand: str | None, drawn: str | None) -> None:
+def check_same_secret_seed(holder: str, at_hand: str | None, drawn: str | None) -> None:
     """Raise an `InputError` unless a salt, or none, is the one that trials were drawn with.
 
     Args:
@@ -109,11 +109,13 @@ def check_same_salt(holder: str, at_hand: str | None, drawn: str | None) -> None
     """
     if at_hand == drawn:
         return
-    require(drawn is not None, f"{holder} holds trials drawn without a salt; leave --salt-file out.")
+    require(drawn is not None, f"{holder} holds trials drawn without a salt; leave --secret-seed-file out.")
     what = "no salt file was given" if at_hand is None else f"the salt file given is that of {at_hand}"
-    raise InputError(f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
+    raise InputError(
+        f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --secret-seed-file."
+    )
 
 
-def with_salt(drawn: str | None) -> str:
+def describe_secret_seed(drawn: str | None) -> str:
     """`with the salt 0123456789abcdef`, or `without a salt`."""
     return f"with the salt {drawn}" if drawn else "without a salt"

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench import Assembly, InputError, Observation, TrialSettings, load_scenario
+from apo_bench import Assembly, InputError, Observation, TrialConfig, load_scenario
 from apo_bench.assembly import Contact, relation_graph
 from apo_bench.assembly.equations import equations
-from apo_bench.perception.observation.relations import (
+from apo_bench.perception.observation.wrong_contacts import (
     NEAR_FACES_M,
     TOUCHING_M,
     Shifted,
+    contact_source_name,
     culprit,
     false,
-    make_relations,
+    make_contacts,
     missed,
-    relations_name,
-    with_relations,
+    with_contacts,
 )
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
+from apo_bench.trial.stages import ARM, CONTACT_SOURCE, DEMONSTRATION, LAYOUT, OBSERVATION, stream
 from tests import scenes
 
 SEEDS = range(4)
@@ -44,13 +44,13 @@ def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
     right = contacts(scene.assembly)
     arguments = (scene.assembly, scene.start, scene.goals)
-    less = contacts(missed(*arguments, stream(seed, RELATIONS)))
+    less = contacts(missed(*arguments, stream(seed, CONTACT_SOURCE)))
     assert less < right
     assert len(right - less) == 1
-    off = contacts(Shifted()(*arguments, stream(seed, RELATIONS)))
+    off = contacts(Shifted()(*arguments, stream(seed, CONTACT_SOURCE)))
     assert len(off) == len(right)
     assert len(right - off) == 1
-    more = contacts(false(*arguments, stream(seed, RELATIONS)))
+    more = contacts(false(*arguments, stream(seed, CONTACT_SOURCE)))
     assert more > right
     assert len(more - right) == 1
 
@@ -59,7 +59,7 @@ def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_shifted_face_is_off_by_its_size_and_every_other_contact_holds(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
-    wrong = Shifted(3e-3)(scene.assembly, scene.start, scene.goals, stream(seed, RELATIONS))
+    wrong = Shifted(3e-3)(scene.assembly, scene.start, scene.goals, stream(seed, CONTACT_SOURCE))
     off = gaps(wrong, scene)
     accused = [r.contact not in scene.assembly.operations[r.made].contacts for r in wrong.relations()]
     assert_allclose(off[accused], 3e-3, atol=1e-12)
@@ -71,7 +71,7 @@ def test_a_false_contact_is_plausible(name: str) -> None:
     """It joins a moved part and one that stands there; their faces are apart, and where a scenario has them, near."""
     s = load_scenario(name)
     for seed in SEEDS:
-        wrong = false(s.assembly, s.start, s.goals, stream(seed, RELATIONS))
+        wrong = false(s.assembly, s.start, s.goals, stream(seed, CONTACT_SOURCE))
         ((made, contact),) = contacts(wrong) - contacts(s.assembly)
         before = {part for operation in s.assembly.operations[:made] for part in operation.moves}
         assert contact.manipulated.part in s.assembly.operations[made].moves
@@ -87,8 +87,11 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
     scene = scenes.stick_in_tower()
     arguments = (scene.assembly, scene.start, scene.goals)
     for seed in SEEDS:
-        assert culprit(scene.assembly, missed(*arguments, stream(seed, RELATIONS))) is None
-        for wrong in (false(*arguments, stream(seed, RELATIONS)), Shifted()(*arguments, stream(seed, RELATIONS))):
+        assert culprit(scene.assembly, missed(*arguments, stream(seed, CONTACT_SOURCE))) is None
+        for wrong in (
+            false(*arguments, stream(seed, CONTACT_SOURCE)),
+            Shifted()(*arguments, stream(seed, CONTACT_SOURCE)),
+        ):
             ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
             (arc,) = [arc for arc in relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
             assert culprit(scene.assembly, wrong) == arc.name
@@ -99,7 +102,7 @@ def test_shared_faces_are_shifted_for_one_contact_only() -> None:
     """The table's top carries three blocks of Fig. 6; two of them keep it where it is."""
     scene = scenes.pockets()
     for seed in range(40):
-        wrong = Shifted()(scene.assembly, scene.start, scene.goals, stream(seed, RELATIONS))
+        wrong = Shifted()(scene.assembly, scene.start, scene.goals, stream(seed, CONTACT_SOURCE))
         ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
         if contact.environment.part == "table" and contact.environment.face == "top_shifted":
             assert sum(r.contact.environment.face == "top" for r in wrong.relations()) == 3
@@ -113,9 +116,9 @@ def test_shared_faces_are_shifted_for_one_contact_only() -> None:
 def test_a_plan_has_the_relations_that_its_planner_was_given() -> None:
     scene = scenes.stick_in_tower()
     seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 1.0, 1.0))
-    wrong = with_relations(seen, Shifted(3e-3), scene.goals, stream(4, RELATIONS))
+    wrong = with_contacts(seen, Shifted(3e-3), scene.goals, stream(4, CONTACT_SOURCE))
     assert wrong.goals.tobytes() == seen.goals.tobytes()
-    for method in ("oracle", "none"):
+    for method in ("oracle", "uncorrected"):
         with_wrong = apply_method(method, wrong, scene.goals)
         without = apply_method(method, seen, scene.goals)
         assert with_wrong.plan is not None
@@ -134,7 +137,7 @@ def test_a_plan_has_the_relations_that_its_planner_was_given() -> None:
 
 
 def test_the_stream_is_its_own() -> None:
-    assert len({LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS}) == 5
+    assert len({LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE}) == 5
     assert (LAYOUT, DEMONSTRATION, OBSERVATION, ARM) == (0, 1, 2, 3)
 
 
@@ -143,21 +146,21 @@ def test_the_stream_is_its_own() -> None:
     [("given", "given"), ("shifted", "shifted:2"), ("shifted:3.0", "shifted:3"), ("shifted:0.5", "shifted:0.5")],
 )
 def test_rows_spell_relations_one_way(given: str, name: str) -> None:
-    assert relations_name(given) == TrialSettings("stick_in_tower", relations=given).relations == name
+    assert contact_source_name(given) == TrialConfig("stick_in_tower", contact_source=given).relations == name
 
 
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
-    assert make_relations("given") is None
-    assert make_relations("missed") is missed
-    assert make_relations("apo_bench.perception.observation.relations:false") is false
-    assert make_relations("shifted:3") == Shifted(3e-3)
-    assert make_relations(Shifted(1e-3)) == Shifted(1e-3)
+    assert make_contacts("given") is None
+    assert make_contacts("false-negative") is missed
+    assert make_contacts("apo_bench.perception.observation.wrong_contacts:false") is false
+    assert make_contacts("shifted:3") == Shifted(3e-3)
+    assert make_contacts(Shifted(1e-3)) == Shifted(1e-3)
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("mised", "did you mean 'missed'"),
+        ("mised", "did you mean 'false-negative'"),
         ("shifted:far", "a size above 0 and up to 50 mm is allowed"),
         ("shifted:-1", "a size above 0 and up to 50 mm is allowed"),
         (7, "are no function; give (assembly, start, goals, rng) -> Assembly"),
@@ -165,7 +168,7 @@ def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
 )
 def test_what_make_relations_refuses(given: object, words: str) -> None:
     with pytest.raises(InputError) as refused:
-        make_relations(given)
+        make_contacts(given)
     assert words in str(refused.value)
 
 
@@ -178,7 +181,7 @@ def test_relations_change_nothing_but_contacts_and_faces() -> None:
         (replace(scene.assembly, solids={"table": scenes.table()}), "changed parts or operations"),
     ):
         with pytest.raises(InputError) as refused:
-            with_relations(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
+            with_contacts(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
         assert words in str(refused.value)
 
 

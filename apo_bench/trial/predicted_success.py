@@ -28,7 +28,7 @@ from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space
-from apo_bench.trial.promise_table import RATES, SCORES
+from apo_bench.trial.predicted_success_table import RATES, SCORES
 
 if TYPE_CHECKING:
     from apo_bench.simulation.scene.scene import Scene
@@ -85,14 +85,14 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     return tuple(Explanation(share * each.weight, each.believed, each.goals, each.dropped, blind) for each in likely)
 
 
-def promised_success(
+def predict_success(
     plan: Plan,
     believed: Observation,
     correction: Correction | None,
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
-    searches: bool = False,
-    feels: bool = False,
+    spiral: bool = False,
+    probing: bool = False,
 ) -> float:
     """The probability that a plan succeeds; the same for the same arguments.
 
@@ -102,23 +102,23 @@ def promised_success(
         correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
         where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
         robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
-        searches: The robot feels for a hole where a motion into it is stopped, as one with `+feel` does too.
+        searches: The robot feels for a hole where a motion into it is stopped, as one with `+probe` does too.
         feels: The robot touches first, and makes up for its errors: what is left is how parts slip in its hand.
     """
     explained = explanations(correction, believed, plan.goals)
-    score = plan_score(plan, explained, where, robot_error, searches, feels)
+    score = plan_score(plan, explained, where, robot_error, spiral, probing)
     return float(np.interp(score, SCORES, RATES))
 
 
-def promise_sentence(promised: float) -> str:
+def predicted_success_sentence(predicted_success: float) -> str:
     """`success with probability 0.93`."""
-    return f"success with probability {promised:.2f}"
+    return f"success with probability {predicted_success:.2f}"
 
 
-def abstained(promised: float, least: float) -> Outcome:
+def abstained(predicted_success: float, least: float) -> Outcome:
     """The ending of a trial whose plan promises less than was asked for."""
     # as many digits as tell the two apart: 0.947, where 0.95 is asked
-    said = next(text for digits in range(2, 20) if float(text := f"{promised:.{digits}f}") < least)
+    said = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
     why = f": {said}, where {least:.15g} is asked"
     return Outcome("promise", "abstained", None, sentence("abstained") + why)
 
@@ -128,8 +128,8 @@ def plan_score(
     explained: Sequence[Explanation],
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
-    searches: bool = False,
-    feels: bool = False,
+    spiral: bool = False,
+    probing: bool = False,
 ) -> float:
     """How near to certain it is that a plan fits, from 0 to 1: what the table turns into a probability.
 
@@ -137,7 +137,7 @@ def plan_score(
         plan: With the contacts that the planner was given.
         where, robot_error, searches, feels: As in `promised_success`.
     """
-    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches, feels)
+    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, spiral, probing)
     if any(move.refused is not None for move in arm):
         return 0.0
     rng = np.random.default_rng(_STREAM)
@@ -153,22 +153,22 @@ def plan_score(
 
 
 def _by_arm(
-    plan: Plan, scene: Scene, robot_error: str, searches: bool, feels: bool
+    plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
 ) -> tuple[list[tuple[Poses, ...]], tuple[ArmMove, ...]]:
     """Where robots with errors that were drawn bring the parts, and what the arm makes of the plan."""
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought, left_after_feeling
     from apo_bench.trial.stages import robot_error_of
 
-    arm = arm_moves(plan, scene, searches)
+    arm = arm_moves(plan, scene, spiral)
     slip = robot_sigmas(robot_error).in_hand
-    right = not any(slip) if feels else robot_error == NO_ROBOT_ERROR
+    right = not any(slip) if probing else robot_error == NO_ROBOT_ERROR
     if right or any(move.refused is not None for move in arm):
         return [], arm
     errors = [robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS)]
-    if feels:
+    if probing:
         errors = [left_after_feeling(plan, scene, error, slip[1]) for error in errors]
-    return [brought(plan, scene, error, searches) for error in errors], arm
+    return [brought(plan, scene, error, spiral) for error in errors], arm
 
 
 def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:

@@ -33,7 +33,7 @@ from apo_bench.assembly import (
 from apo_bench.errors import RAISED, InputError, failed, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
 from apo_bench.names import resolve
-from apo_bench.records import GIVEN, SHIFT_MM, WRONG_RELATIONS, relations_name
+from apo_bench.records import GIVEN, SHIFT_MM, WRONG_CONTACTS, contact_source_name
 
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
@@ -49,7 +49,7 @@ _SHARED = 0.15
 """Round faces that have less of their length in common do not meet."""
 
 
-def make_relations(given: Any) -> Relations | None:
+def make_contacts(given: Any) -> Relations | None:
     """The function that a name stands for; None for `given`, where nothing is wrong.
 
     Args:
@@ -60,15 +60,15 @@ def make_relations(given: Any) -> Relations | None:
     """
     if not isinstance(given, str):
         return _callable(given, getattr(given, "__name__", type(given).__name__))
-    name = relations_name(given)
+    name = contact_source_name(given)
     if name == GIVEN:
         return None
     if name.startswith("shifted:"):
         return Shifted(float(name.partition(":")[2]) * 1e-3)
-    return _callable(resolve(name, WRONG_RELATIONS, "kind of relations"), name)
+    return _callable(resolve(name, WRONG_CONTACTS, "kind of relations"), name)
 
 
-def with_relations(
+def with_contacts(
     observation: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
 ) -> Observation:
     """An observation with wrong relations in place of the right ones.

@@ -1,11 +1,11 @@
-"""An environment whose robot feels is the trial of a method with `+feel`."""
+"""An environment whose robot feels is the trial of a method with `+probe`."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from apo_bench import TrialSettings
+from apo_bench import TrialConfig
 from apo_bench.envs import starts
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
@@ -18,21 +18,21 @@ SCENARIO = "block_on_block"
 def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def noted(*plain, feels=None, searches=False, **named):  # type: ignore[no-untyped-def]
-        given.append((feels, searches or plain[-1] is True))
+    def noted(*plain, probing=None, spiral=False, **named):  # type: ignore[no-untyped-def]
+        given.append((probing, spiral or plain[-1] is True))
         raise InterruptedError
 
     for where in (starts, trial):
         monkeypatch.setattr(where, "replay_and_judge", noted)
-    settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "stated_error": "hand_eye:1/0.2+tool:0.3"}
-    env = Corrected(APOReplay(SCENARIO, feels=True, **settings))
+    settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
+    env = Corrected(APOReplay(SCENARIO, probing=True, **settings))
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))
     with pytest.raises(InterruptedError):
-        trial.run_trial(TrialSettings(SCENARIO, seed=4, method="contact-robust+feel", **settings))
-    (ours, searches), (theirs, also_searches) = given
-    assert searches
+        trial.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
+    (ours, spiral), (theirs, also_searches) = given
+    assert spiral
     assert also_searches
     assert (ours.wrench, ours.seed, ours.acts) == (theirs.wrench, theirs.seed, theirs.acts)
     assert ours.wrench == "0.5/0.025"
@@ -45,11 +45,11 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
     def noted(*plain, **named):  # type: ignore[no-untyped-def]
-        given.append((named["feels"], named["searches"]))
+        given.append((named["probing"], named["searches"]))
         raise InterruptedError
 
     monkeypatch.setattr(starts, "replay_and_judge", noted)
-    env = APOReplay(SCENARIO, wrench="cobot", stated_error="unstated")
+    env = APOReplay(SCENARIO, wrench="joint-torque", assumed_robot_error="unknown")
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape, dtype=np.float32))
@@ -57,7 +57,7 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"), [("wrench", "unknown wrench sensor"), ("stated_error", "unknown stated error")]
+    ("wrong", "said"), [("wrench", "unknown wrench sensor"), ("assumed_robot_error", "unknown stated error")]
 )
 def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -66,11 +66,11 @@ def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
 
 def test_whether_it_feels_is_true_or_false() -> None:
     with pytest.raises(InputError, match="feels of APOReplay must be True or False, got 'no'"):
-        APOReplay(SCENARIO, feels="no")  # type: ignore[arg-type]
+        APOReplay(SCENARIO, probing="no")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="wrench of APOReplay must be a text, got None"):
         APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]
 
 
 def test_pads_that_do_not_close_square_nothing() -> None:
     with pytest.raises(InputError, match="the grasp 'weld' was given for a robot that feels"):
-        APOReplay(SCENARIO, feels=True, grasp="weld")
+        APOReplay(SCENARIO, probing=True, grasp="weld")
