@@ -48,13 +48,13 @@ def no_disappeared(observation: Observation) -> Correction:
     Goals that are no candidates are settled for what they make, lost contacts too. The status says whether the
     contacts that stand hold; the gaps are those of every contact ever made.
     """
-    if not observation.seen.all():
+    if not observation.observed.all():
         return refused_correction(observation)
     standing = np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
-    system = equations(observation.assembly, observation.start, observation.goals)
-    before = system.gaps(observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
+    before = system.gaps(observation.poses)
     freed = candidates(without_lost(observation.assembly), ~(before <= observation.gap_m)[standing])
-    solution = solve_newton(system.among(standing & system.containing(freed)), observation.goals, freed)
+    solution = solve_newton(system.among(standing & system.containing(freed)), observation.poses, freed)
     status = solver_status(solution, largest(system.gaps(solution.goals)[standing]), observation.gap_m)
     goals = solution.goals
     if status == "converged":
@@ -62,7 +62,7 @@ def no_disappeared(observation: Observation) -> Correction:
             goals = solve_own_contacts(system, goals, k, observation.gap_m)
     kept = "every contact" if standing.all() else "every contact that was kept"
     return Correction(
-        goals=goals,
+        poses=goals,
         status=status,
         sentence=status_sentence(status, observation.gap_m, kept),
         freed=freed,
@@ -97,7 +97,7 @@ def no_history(observation: Observation) -> Correction:
         The status says whether the standing contacts hold at the object poses; the gaps are those of every contact
         ever made. `freed` are the operations that got a new motion parameter.
     """
-    if not observation.seen.all():
+    if not observation.observed.all():
         return refused_correction(observation)
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
     poses = _poses(observation, tuple(last))
@@ -107,14 +107,14 @@ def no_history(observation: Observation) -> Correction:
     solution = solve_newton(system.among(system.containing(free)), poses, free)
     status = solver_status(solution, largest(system.gaps(solution.goals)), observation.gap_m)
     freed = _main(observation.assembly, last, free)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[list(freed)] = solution.goals[list(freed.values())]
     return Correction(
-        goals=goals,
+        poses=goals,
         status=status,
         sentence=status_sentence(status, observation.gap_m, "every contact that stands at the end"),
         freed=tuple(freed),
-        gap_before_m=largest_gap(observation.assembly, observation.start, observation.goals),
+        gap_before_m=largest_gap(observation.assembly, observation.start, observation.poses),
         gap_after_m=largest_gap(observation.assembly, observation.start, goals),
         rank=solution.rank,
         trace=solution.trace,
@@ -123,7 +123,7 @@ def no_history(observation: Observation) -> Correction:
 
 def _poses(observation: Observation, parts: tuple[str, ...]) -> Array:
     """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
-    final = placements(observation.assembly, observation.start, observation.goals)[-1] if parts else {}
+    final = placements(observation.assembly, observation.start, observation.poses)[-1] if parts else {}
     return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
 
 

@@ -93,11 +93,11 @@ def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = N
         scenario = scenarios[seed % len(scenarios)]
         rng = np.random.default_rng([seed, 20])
         layout = draw_layout(scenario, rng, 0.0)
-        n = len(layout.goals)
-        shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+        n = len(layout.poses)
+        shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
         seen = make_noise(name, NoiseLevel(1.0, 1.0))(scenario.assembly, shown, rng)
-        truth = np.array(layout.goals)
-        if seen.seen.all() and not any(outliers(name, seen, truth)):
+        truth = np.array(layout.poses)
+        if seen.observed.all() and not any(outliers(name, seen, truth)):
             made += 1
             yield measured(restated(seen, *stated) if stated else seen, truth)
 
@@ -105,10 +105,10 @@ def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = N
 def outliers(name: str, seen: Observation, truth: Array) -> Iterator[bool]:
     """Which operations are worse than the covariance means to say."""
     L = np.linalg.cholesky(seen.covariance)
-    xi = pose.log(pose.inverse(truth) @ seen.goals)
+    xi = pose.log(pose.inverse(truth) @ seen.poses)
     unit = np.linalg.solve(L, xi[..., None])[..., 0]
     yield from np.sqrt((unit**2).mean(axis=1)) > (3.0 if name == "outliers" else np.inf)
-    yield from np.linalg.norm(seen.goals[:, :3, 3] - truth[:, :3, 3], axis=1) > OUTLIER_M
+    yield from np.linalg.norm(seen.poses[:, :3, 3] - truth[:, :3, 3], axis=1) > OUTLIER_M
 
 
 def measured(seen: Observation, truth: Array) -> Draw:
@@ -116,7 +116,7 @@ def measured(seen: Observation, truth: Array) -> Draw:
     upright = np.array(
         [
             nearest(T, S, symmetries(seen.assembly.solids[main]))
-            for T, S, main in zip(truth, seen.goals, mains, strict=True)
+            for T, S, main in zip(truth, seen.poses, mains, strict=True)
         ]
     )
     made = correct(seen, "contact")
@@ -126,7 +126,7 @@ def measured(seen: Observation, truth: Array) -> Draw:
         return float(1e3 * np.sqrt(np.square(goals[:, :3, 3] - truth[:, :3, 3]).sum(axis=1).mean()))
 
     p = made.test.p_value if made.test else float("nan")
-    return Draw(off(seen.goals), off(alone.goals), off(made.goals), p, contains_truth(seen, made, upright))
+    return Draw(off(seen.poses), off(alone.poses), off(made.poses), p, contains_truth(seen, made, upright))
 
 
 def nearest(T: Array, seen: Array, turns: Array) -> Array:

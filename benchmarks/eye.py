@@ -38,7 +38,7 @@ def measured(scene: Scene, shown: SimulatedDemonstration, noise_level: float, se
         row = {"operation": k + 1, "seed": seed, "noise_level": noise_level, "found": k in of, "locate_s": seconds}
         found = of[k].found if k in of else None
         if found is not None:
-            xi = pose.log(pose.inverse(found.T) @ shown.demonstration.goals[k])
+            xi = pose.log(pose.inverse(found.T) @ shown.demonstration.poses[k])
             row["mm"] = 1e3 * np.linalg.norm(xi[:3])
             row["deg"] = np.degrees(np.linalg.norm(xi[3:]))
             row["chi_square"] = float(xi @ np.linalg.solve(found.covariance, xi))
@@ -53,7 +53,7 @@ def shifted(shown: SimulatedDemonstration) -> dict[str, np.ndarray]:
     demonstration = shown.demonstration
     last = {operation.main: k for k, operation in enumerate(demonstration.assembly.operations)}
     carried = {part for operation in demonstration.assembly.operations for part in operation.carries}
-    before = {part: demonstration.goals[k] for part, k in last.items() if part not in carried}
+    before = {part: demonstration.poses[k] for part, k in last.items() if part not in carried}
     return {part: T for part, T in before.items() if distance_mm(shown, part, T) > 0.5}
 
 
@@ -68,7 +68,7 @@ def noticed(scene: Scene, shown: SimulatedDemonstration, event: Event) -> int:
     """
     parts = shifted(shown)
     demonstration = shown.demonstration
-    stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.goals))
+    stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.poses))
     solids = scene.scenario.assembly.solids
     models = ModelRays(solids, 1e-3 * scene.clearance_mm)
     owner = np.array([*solids, "nothing"])

@@ -75,7 +75,7 @@ CLEARANCE_MM = 0.25
 def right(scenario: Scenario, shown: Demonstration, goals: Array) -> bool:
     """Whether a plan with these goals, (n, 4, 4), is right."""
     assembly = shown.assembly
-    if goal_errors(assembly, shown.start, shown.goals, goals)[0] > CLEARANCE_MM:
+    if goal_errors(assembly, shown.start, shown.poses, goals)[0] > CLEARANCE_MM:
         return False
     for operation, poses in zip(assembly.operations, placements(assembly, shown.start, goals), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))
@@ -86,7 +86,7 @@ def right(scenario: Scenario, shown: Demonstration, goals: Array) -> bool:
 
 def told(seen: Observation, false: NDArray[np.bool_]) -> Observation:
     """An observation in which what is false was not seen, and what was seen is believed."""
-    return replace(seen, seen=seen.seen & ~false, outliers=measured_rates(0.0, 0.0))
+    return replace(seen, observed=seen.observed & ~false, outliers=measured_rates(0.0, 0.0))
 
 
 STATED: dict[float, tuple[float, float]] = {1.0: (RATE, RATE), 1 / 3: (RATE, RATE / 3), 3.0: (RATE / 3, RATE)}
@@ -116,8 +116,8 @@ def drawn(draw: Draw) -> tuple[Demonstration, CameraFailures, Observation, NDArr
     rate, stated = STATED[draw.stated]
     noise = CameraFailures(NOISE_LEVEL, (failure._replace(rate=rate),), repeat)
     layout = draw_layout(scenario, np.random.default_rng([draw.seed, 30, 0]), 0.0)
-    n = len(layout.goals)
-    shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    n = len(layout.poses)
+    shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     seen = observe(shown, noise, np.random.default_rng([draw.seed, 30, 1]))
     assert seen.outliers is not None
     false = noise.draw_false(shown, np.random.default_rng([draw.seed, 30, 1])).false
@@ -138,7 +138,7 @@ def corrected(draw: Draw) -> dict[str, object]:
         given = told(seen, false) if name == "told" else seen
         made = correct(given, "contact-robust", max_reobservations if name.startswith("max_reobservations") else None)
         seconds[name] = round(time.process_time() - since, 4)
-        ends[name] = made.ok and right(scenario, shown, made.goals)
+        ends[name] = made.ok and right(scenario, shown, made.poses)
         sentence = made.sentence if name == "contact-robust" else sentence
     false_ones = [int(k) + 1 for k in np.flatnonzero(false)]
     return asdict(draw) | {

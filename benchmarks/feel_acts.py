@@ -163,7 +163,7 @@ def trial(case: Case) -> Line:
     }
     if simulated.demonstration.code != "ok":
         return first | {"success": None, "code": simulated.demonstration.code}
-    truth = simulated.layout.goals
+    truth = simulated.layout.poses
     seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), case.seed)
     planned = apply_method(parse_method(case.method).plan, seen, truth, where=scene)
     if planned.plan is None:

@@ -9,45 +9,42 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-SETTINGS = {
-    "noise_mm": "level_mm",
-    "noise_deg": "level_deg",
-    "noise_level": "level",
-    "human_error_scale": "careless",
-    "pose_source": "eye",
-    "contact_source": "relations",
-    "max_reobservations": "looks",
-    "ft_sensor": "wrench",
-    "assumed_robot_error": "stated_error",
-    "min_predicted_success": "abstain",
-    "secret_seed": "salt",
-}
+SETTINGS: dict[str, str] = {}
 """Settings of trials, arguments of environments and columns of records: neutral name -> name today."""
-VALUES = {
-    "uncorrected": "none",
-    "nominal": "by-heart",
-    "spiral": "search",
-    "probe": "feel",
-    "physics-settle": "settle",
-    "near-contact": "contact",
-    "depth-camera": "range",
-    "detected": "recognised",
-    "unknown": "unstated",
-    "detected-jointly": "recognised-jointly",
-    "false-negative": "missed",
-    "false-positive": "false",
-    "joint-torque": "cobot",
-}
+VALUES: dict[str, str] = {}
 """Values of settings, and correctors."""
-EXPORTS = {"detect_contacts": "recognise", "TrialConfig": "TrialSettings"}
+EXPORTS = {"detect_contacts": "recognise"}
 """What `apo_bench` exports."""
-KEYS = {"poses": "goals", "observed": "seen", "human_covariance": "careless", "predicted_success": "promised"}
+KEYS = {
+    "seen_again": "reobservations",
+    "wrong_relation": "wrong_contact",
+    "touches_refused": "probe_contacts_rejected",
+    "felt_mm": "base_error_estimate_mm",
+    "felt_deg": "base_error_estimate_deg",
+    "felt_sure_mm": "base_error_std_mm",
+    "felt_sure_deg": "base_error_std_deg",
+    "contacts_right": "contacts_true_positive",
+    "contacts_missed": "contacts_false_negative",
+    "contacts_false": "contacts_false_positive",
+    "free_moved": "fit_adjustments",
+    "moved_in_hand": "grasp_slip",
+    "pushed_mm": "displaced_mm",
+    "sim_seconds": "sim_time_s",
+    "chi_square_freedom": "chi_square_dof",
+    "freed": "corrected_operations",
+    "tried": "tried_corrections",
+    "left_out": "inferred_operations",
+    "predicted": "failure_prediction",
+    "touches": "probe_contacts",
+    "targets": "step_poses",
+    "human_covariance": "human_error_covariance",
+}
 """Attributes, columns of records, keys of observations and of `info`."""
 DROPPED = {
     *(
         "schema",
         "env_id",
-        "spec_hash",
+        "config_hash",
         "scenario",
         "noise_level",
         "noise_mm",

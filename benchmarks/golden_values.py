@@ -114,7 +114,7 @@ def observe(item: Item, demonstration: Any) -> Any:
     """What is observed of a demonstration."""
     noise = "isotropic" if item.seed == 0 else NOISES[(2 * SCENARIOS.index(item.scenario) + item.seed) % len(NOISES)]
     rng = np.random.default_rng([item.seed, 2])
-    return apo_bench.observe(demonstration, today(noise, VALUES), rng, level=LEVELS[item.seed])
+    return apo_bench.observe(demonstration, today(noise, VALUES), rng, noise_level=LEVELS[item.seed])
 
 
 def perturbed(observation: Any) -> Any:

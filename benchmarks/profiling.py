@@ -109,7 +109,7 @@ def planned(scene: Scene, method: str, seed: int) -> Any:
     """What a method would have the robot do."""
     shown = simulate_demonstration(scene, 1.0, seed)
     made = apply_method(
-        method, observe_demonstration(shown, make_noise("isotropic", NoiseLevel(1.0, 1.0)), seed), shown.layout.goals
+        method, observe_demonstration(shown, make_noise("isotropic", NoiseLevel(1.0, 1.0)), seed), shown.layout.poses
     )
     assert made.plan is not None, made.failure
     return made.plan

@@ -161,9 +161,9 @@ def _trial(
     made = apply_method(settings.method, seen, None, where=scene)
     if made.plan is None:
         return "0", NO_PLAN, ""
-    explained = explanations(made.correction, seen, made.plan.goals)
+    explained = explanations(made.correction, seen, made.plan.target_poses)
     score = plan_score(made.plan, explained, scene, settings.robot_error)
     error = draw_robot_error(settings.robot_error, scene, settings.seed)
-    truth = simulated.layout.goals
+    truth = simulated.layout.poses
     attempt = replay_and_judge(made.plan, scene, truth, None, settings.fidelity, cache, error=error)
     return str(int(attempt.verdict.success)), trial_outcome(attempt).code, repr(score)

@@ -95,7 +95,7 @@ def carried_out(truth: Truth, found: ImportedRecording, method: str) -> tuple[bo
     if made.plan is None:
         return False, made.failure.code if made.failure else "no plan"
     done = replay(made.plan, truth.scene, parts_at=truth.layout.start, fidelity="near-contact")
-    verdict = judge(truth.scene.scenario.assembly, done.reached, truth.layout.goals, truth.scene.criteria)
+    verdict = judge(truth.scene.scenario.assembly, done.reached, truth.layout.poses, truth.scene.criteria)
     return verdict.success, done.outcome.code if done.outcome.failed else verdict.rests_on.code
 
 

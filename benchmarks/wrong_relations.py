@@ -73,15 +73,15 @@ def ends(seed: int, kind: str, scene: str) -> list[str]:
     """What is to be counted of one draw."""
     scenario = load_scenario(scene)
     layout = draw_layout(scenario, np.random.default_rng([seed, 32, 0]), 0.0)
-    nothing = np.zeros((len(layout.goals), 6, 6))
-    shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
+    nothing = np.zeros((len(layout.poses), 6, 6))
+    shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, nothing)
     seen = observe(shown, make_noise("isotropic", NOISE_LEVEL), np.random.default_rng([seed, 32, 1]))
-    wrong = with_contacts(seen, make_contacts(kind), layout.goals, np.random.default_rng([seed, 32, 2]))
+    wrong = with_contacts(seen, make_contacts(kind), layout.poses, np.random.default_rng([seed, 32, 2]))
     found = ["draws"]
     for name in CORRECTORS:
         given = wrong if name != "told" else replace(seen, assembly=without_wrong(seen.assembly, wrong.assembly))
         made = correct(given, "contact-robust" if name == "told" else name)
-        if made.ok and right(scenario, shown, made.goals):
+        if made.ok and right(scenario, shown, made.poses):
             found.append(name)
         if name == "contact-robust" and made.dropped:
             found.append("accused" if blames(seen, wrong, made.dropped) else "falsely")

@@ -120,11 +120,11 @@ def _draw(name: str, strip: Strip) -> None:
     corrected = apply_method(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"
     assert corrected is not None, f"{strip.method} corrects {name}"
-    failed, right = (_watched(scene, each, shown.layout.goals) for each in (raw, corrected))
+    failed, right = (_watched(scene, each, shown.layout.poses) for each in (raw, corrected))
     pictures = [(strip.failure, failed[1][-1][1]), *((m.caption, _state(right, m)) for m in strip.moments)]
     rows = -(-len(pictures) // COLUMNS)
     figure, axes = plt.subplots(rows, COLUMNS, figsize=(3.0 * COLUMNS, 2.9 * rows + 0.4), layout="constrained")
-    camera = _camera(shown.layout.goals)
+    camera = _camera(shown.layout.poses)
     for axis, (caption, state) in zip(axes.flat, pictures, strict=True):
         axis.imshow(picture_with_arm(scene, shown.layout.start, state, *SIZE, camera))
         axis.set_title(caption, fontsize=12)

@@ -60,12 +60,12 @@ def row(name: str) -> str:
     for seed in range(TRIALS):
         seen = observe(shown, noise, np.random.default_rng([seed, 2]))
         made = correct(seen, "contact")
-        whole += int(seen.seen.all())
+        whole += int(seen.observed.all())
         if made.ok:
             assert made.test is not None
             fails += int(not made.test.passes)
-            seen_off.append(seen.goals[:, :3, 3] - shown.goals[:, :3, 3])
-            off.append(made.goals[:, :3, 3] - shown.goals[:, :3, 3])
+            seen_off.append(seen.poses[:, :3, 3] - shown.poses[:, :3, 3])
+            off.append(made.poses[:, :3, 3] - shown.poses[:, :3, 3])
     before, after = (f"{1e3 * np.sqrt(np.mean(np.square(some))):.2f} mm" for some in (seen_off, off))
     test = f"{fails} of {len(off)}"
     return f"| [{name}](#{name}) | {whole} of {TRIALS} | {test} | {before} | {after} |"

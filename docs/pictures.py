@@ -29,17 +29,17 @@ def main() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
     shown = simulate_demonstration(scene, 1.0, SEED)
     seen = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
-    corrected = correct(seen, "contact").goals
+    corrected = correct(seen, "contact").poses
     with_ur5e = build_scene(scene.scenario, arm=ARM)
     shots = [
-        shot(with_ur5e, Plan(seen.assembly, seen.start, goals), shown.layout.goals, *told)
+        shot(with_ur5e, Plan(seen.assembly, seen.start, goals), shown.layout.poses, *told)
         for goals, told in (
-            (seen.goals, ("As seen: it jams", "the end of the stick\nmeets the faces", JAMS)),
+            (seen.poses, ("As seen: it jams", "the end of the stick\nmeets the faces", JAMS)),
             (corrected, ("Corrected by contacts: it fits", "0.25 mm of play\non each side", FITS)),
         )
     ]
     draw_top(shots, HERE / "top.png")
-    beliefs = [belief_panel("as seen", seen, seen.goals, 3), belief_panel("corrected by contact", seen, corrected, 3)]
+    beliefs = [belief_panel("as seen", seen, seen.poses, 3), belief_panel("corrected by contact", seen, corrected, 3)]
     draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")

@@ -26,7 +26,7 @@ def motion(name: str) -> tuple[Array, Mapping[str, Array]]:
     layout = layout_at(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm)
     now = {part: T for part, T in layout.start.items() if part not in scenario.assembly.fixed}
     frames = [dict(now)] * round(_REST_S * RATE_HZ)
-    for operation, goal in zip(scenario.assembly.operations, layout.goals, strict=True):
+    for operation, goal in zip(scenario.assembly.operations, layout.poses, strict=True):
         before = dict(now)
         for s in np.linspace(0.0, 1.0, round(_MOVE_S * RATE_HZ)):
             T = _between(before[operation.main], goal, s)

@@ -42,7 +42,7 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
     correction = apo_bench.correct(observation)
     at_rest = Snapshot(shown.final, 0.0, 0.0, 0.0, True)
     reached = Reached((at_rest,) * len(assembly), at_rest)
-    reference = simulated.layout.goals
+    reference = simulated.layout.poses
     made = tmp_path_factory.mktemp("valid")
     rows = [f"{k},{each.main},0,0,30,1,0,0,0" for k, each in enumerate(assembly.operations, start=1)]
     (made / "seen.csv").write_text("\n".join(["operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows]), encoding="utf-8")
@@ -154,14 +154,14 @@ def test_an_environment_answers_a_wrong_argument_in_one_sentence(name: str) -> N
 
 def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
     observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    n = len(observation.goals)
-    assert dataclasses.replace(observation, seen=[1] * n).seen.all()
+    n = len(observation.poses)
+    assert dataclasses.replace(observation, observed=[1] * n).observed.all()
     for seen in ([2] * n, [np.nan] * n, ["yes"] * n):
         with pytest.raises(apo_bench.InputError, match="seen of Observation must be an array of True"):
-            dataclasses.replace(observation, seen=seen)
+            dataclasses.replace(observation, observed=seen)
     start = {**observation.start, "stik": np.eye(4)}
     shown = {"human_error_scale": observation.covariance, "final": {}}
-    parts = {"assembly": observation.assembly, "goals": observation.goals}
+    parts = {"assembly": observation.assembly, "poses": observation.poses}
     for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, parts)):
         with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'; did you mean 'stick'"):
             record(**{**more, "start": start})
@@ -173,12 +173,12 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
 def test_an_array_of_a_wrong_shape_is_named() -> None:
     observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
     with pytest.raises(apo_bench.InputError, match=r"^goals of Observation: an array of shape \(\d, 4, 4\) is needed"):
-        dataclasses.replace(observation, goals=observation.goals[:1])
+        dataclasses.replace(observation, poses=observation.poses[:1])
 
 
 def test_a_noise_model_that_makes_a_wrong_record_is_named(castles: apo_bench.Scene) -> None:
     def mine(assembly: Any, shown: Any, rng: Any) -> Any:
-        return apo_bench.Observation(assembly, shown.start, shown.goals, None, [True] * len(assembly))  # type: ignore[arg-type]
+        return apo_bench.Observation(assembly, shown.start, shown.poses, None, [True] * len(assembly))  # type: ignore[arg-type]
 
     shown = simulate_demonstration(castles, 0.0, 0).demonstration
     with pytest.raises(
@@ -234,7 +234,7 @@ def test_a_text_where_several_names_may_stand_is_one_name(
 
 def test_a_relation_that_is_left_out_may_be_one_text() -> None:
     observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    one, several, all_of_them = (apo_bench.explain(observation, observation.goals, x) for x in ("R1", ("R1",), ()))
+    one, several, all_of_them = (apo_bench.explain(observation, observation.poses, x) for x in ("R1", ("R1",), ()))
     assert one.redundant == several.redundant < all_of_them.redundant
     assert (observation.assembly.without("R1") == observation.assembly.without(("R1",))).all()
 

@@ -47,8 +47,8 @@ def test_a_level_is_for_a_noise_model_that_is_named() -> None:
         apo_bench.observe(shown, "isotropic", np.random.default_rng(3), noise_level=noise_level)
         for noise_level in (2.0, (2.0, 2.0))
     ]
-    assert seen[0].goals.tobytes() == seen[1].goals.tobytes()
+    assert seen[0].poses.tobytes() == seen[1].poses.tobytes()
     made = apo_bench.observe(shown, "isotropic", np.random.default_rng(3))
-    assert np.abs(made.goals - shown.goals).max() < np.abs(seen[0].goals - shown.goals).max()
+    assert np.abs(made.poses - shown.poses).max() < np.abs(seen[0].poses - shown.poses).max()
     with pytest.raises(apo_bench.InputError, match=r"the level 2\.0 was given together with a noise"):
         apo_bench.observe(shown, lambda assembly, shown, rng: seen[0], np.random.default_rng(3), noise_level=2.0)

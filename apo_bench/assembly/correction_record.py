@@ -88,7 +88,7 @@ class Hypothesis:
 
     weight: float
     """Probability; what all those of a correction leave to 1 is that of none of them."""
-    goals: Array
+    poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array | None
     """(n, 6, 6), posterior, of the body twist by which each goal may still be wrong, [m, rad]; None if unknown."""
@@ -104,7 +104,7 @@ class Hypothesis:
     """How much larger than stated the noise is; `covariance` and `believed` count it."""
 
     def __post_init__(self) -> None:
-        freeze(self, goals=(None, 4, 4), covariance=(len(self.goals), 6, 6))
+        freeze(self, poses=(None, 4, 4), covariance=(len(self.poses), 6, 6))
 
 
 @final
@@ -114,7 +114,7 @@ class Hypothesis:
 class Correction:
     """What a corrector returns: the goals, and what happened."""
 
-    goals: Array
+    poses: Array
     status: str
     """`converged`, or one of the endings in `apo_bench.records.outcomes`."""
     sentence: str
@@ -131,8 +131,8 @@ class Correction:
     """Every set of motion parameters that was tried, in order."""
     schedule: tuple[Step, ...] = ()
     """What to do and undo, in order; empty stands for: every operation once."""
-    targets: Array | None = None
-    """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
+    step_poses: Array | None = None
+    """(steps, 4, 4) as in `Plan`; None stands for `poses` throughout."""
     test: Consistency | None = None
     """Whether the stated noise explains the correction; None of correctors that do not ask."""
     test_after: Consistency | None = None
@@ -154,8 +154,8 @@ class Correction:
     """How much larger than stated the noise seems to be; `covariance` and `believed` count it."""
 
     def __post_init__(self) -> None:
-        n = len(self.goals)
-        freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), targets=(len(self.schedule), 4, 4))
+        n = len(self.poses)
+        freeze(self, poses=(n, 4, 4), covariance=(n, 6, 6), step_poses=(len(self.schedule), 4, 4))
 
     @property
     def ok(self) -> bool:
@@ -173,8 +173,8 @@ class Correction:
             f"the correction ended as {self.status} ({self.sentence}), which no robot should carry out; look at "
             "`correction.ok` first.",
         )
-        targets = np.zeros((0, 4, 4)) if self.targets is None else self.targets
-        return Plan(observation.assembly, observation.start, self.goals, self.schedule, targets)
+        step_poses = np.zeros((0, 4, 4)) if self.step_poses is None else self.step_poses
+        return Plan(observation.assembly, observation.start, self.poses, self.schedule, step_poses)
 
 
 @runtime_checkable

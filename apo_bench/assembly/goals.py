@@ -30,11 +30,11 @@ SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and h
 class Layout:
     """The truth of a trial: the consistent goals a seed draws, before any human error."""
 
-    goals: Array
+    poses: Array
     start: Poses
 
     def __post_init__(self) -> None:
-        freeze(self, goals=(None, 4, 4), start=(4, 4))
+        freeze(self, poses=(None, 4, 4), start=(4, 4))
 
 
 @final
@@ -46,7 +46,7 @@ class Demonstration:
 
     assembly: Assembly
     start: Poses
-    goals: Array
+    poses: Array
     """(n, 4, 4): pose of each operation's main part when the hand had let go of it and it rested."""
     final: Poses
     """Where every part lay at the end: small late adjustments show here and nowhere else."""
@@ -63,7 +63,7 @@ class Demonstration:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        freeze(self, goals=(n, 4, 4), human_error_covariance=(n, 6, 6), start=(4, 4), final=(4, 4))
+        freeze(self, poses=(n, 4, 4), human_error_covariance=(n, 6, 6), start=(4, 4), final=(4, 4))
         _check_parts(self.assembly, self.start, self.final)
 
 
@@ -76,11 +76,11 @@ class Observation:
 
     assembly: Assembly
     start: Poses
-    goals: Array
+    poses: Array
     """(n, 4, 4)."""
     covariance: Array
     """(n, 6, 6), of the body twist by which each goal is wrong, [m, rad]."""
-    seen: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     """(n,): whether the operation was seen at all."""
     gap_m: float = 1e-4
     """Largest |e| at which the contact equations count as solved, [m]."""
@@ -95,7 +95,7 @@ class Observation:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
+        freeze(self, poses=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
         _check_parts(self.assembly, self.start)
         object.__setattr__(self, "shared", tuple(self.shared))
         for error in self.shared:
@@ -105,11 +105,11 @@ class Observation:
                 )
         if self.tails is not None and len(self.tails.frames) != n:
             raise ArgumentError(f"tails of {len(self.tails.frames)} operations were given for {n}")
-        seen = np.array(self.seen, dtype=np.bool_)
-        if seen.shape != (n,):
-            raise ArgumentError(f"`seen` needs shape ({n},), {seen.shape} was given")
-        seen.flags.writeable = False
-        object.__setattr__(self, "seen", seen)
+        observed = np.array(self.observed, dtype=np.bool_)
+        if observed.shape != (n,):
+            raise ArgumentError(f"`observed` needs shape ({n},), {observed.shape} was given")
+        observed.flags.writeable = False
+        object.__setattr__(self, "observed", observed)
 
     def plan(self) -> "Plan":
         """What was seen, as it is: the plan of the method `uncorrected`.
@@ -118,11 +118,11 @@ class Observation:
             InputError: An operation was not seen.
         """
         require(
-            self.seen.all(),
-            f"operation {int(np.argmin(self.seen)) + 1} was not seen, so the observation cannot be replayed as is; "
+            self.observed.all(),
+            f"operation {int(np.argmin(self.observed)) + 1} was not seen, so the observation cannot be replayed as is; "
             "observe the demonstration again.",
         )
-        return Plan(self.assembly, self.start, self.goals)
+        return Plan(self.assembly, self.start, self.poses)
 
 
 def _check_parts(assembly: Assembly, *placed: Poses) -> None:
@@ -152,31 +152,33 @@ class Plan:
 
     assembly: Assembly
     start: Poses
-    goals: Array
+    target_poses: Array
     """(n, 4, 4): where every operation puts its main part in the end."""
     schedule: tuple[Step, ...] = field(default=())
     """Empty stands for: every operation once, in order."""
-    targets: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    step_poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
-    that it undoes. Empty stands for: those of `goals`."""
+    that it undoes. Empty stands for: those of `target_poses`."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        freeze(self, goals=(n, 4, 4), start=(4, 4))
+        freeze(self, target_poses=(n, 4, 4), start=(4, 4))
         _check_parts(self.assembly, self.start)
         if not self.schedule:
             object.__setattr__(self, "schedule", once_each(n))
-        if not len(self.targets):
-            object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
-        freeze(self, targets=(len(self.schedule), 4, 4))
+        if not len(self.step_poses):
+            object.__setattr__(self, "step_poses", self.target_poses[[step.operation for step in self.schedule]])
+        freeze(self, step_poses=(len(self.schedule), 4, 4))
 
     @check_arguments
-    def with_goals(self, goals: Array) -> "Plan":
-        """The plan with other goals, (n, 4, 4), and with them where its schedule brings parts to the old ones."""
+    def with_target_poses(self, poses: Array) -> "Plan":
+        """The plan with other target poses, (n, 4, 4), also in the steps that bring parts to the old ones."""
         done = [step.operation for step in self.schedule]
-        # targets that are not goals are states in between, which stay where they are
-        final = (self.targets == self.goals[done]).all(axis=(1, 2))
-        return replace(self, goals=goals, targets=np.where(final[:, None, None], goals[done], self.targets))
+        # step poses that are not target poses are states in between, which stay where they are
+        final = (self.step_poses == self.target_poses[done]).all(axis=(1, 2))
+        return replace(
+            self, target_poses=poses, step_poses=np.where(final[:, None, None], poses[done], self.step_poses)
+        )
 
 
 def placements(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:
@@ -225,10 +227,10 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
 
 def goals_in_force(plan: Plan) -> list[tuple[int, Array]]:
     """How many operations are done, and the goals in force, before each time something is undone and at the end."""
-    goals = np.array(plan.goals)
+    goals = np.array(plan.target_poses)
     done = 0
     stages = []
-    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
         if not step.undo:
             goals[step.operation] = target
             done = step.operation + 1

@@ -127,8 +127,8 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
 
 def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
     """The largest |e| of every arc at the observed goals, [m]; None where an operation that it needs was not seen."""
-    residuals = arc_residuals(observation.assembly, observation.start, observation.goals, graph)
-    known = [all(observation.seen[k] for k in arc.operations) for arc in graph.arcs]
+    residuals = arc_residuals(observation.assembly, observation.start, observation.poses, graph)
+    known = [all(observation.observed[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
 
 

@@ -95,8 +95,8 @@ def _explained(observation: Observation, correction: Correction) -> Any:
 
     if (
         not correction.ok
-        or 6 * len(correction.goals) > LARGEST_POSTERIOR
-        or gap_of(observation, correction.goals, correction.dropped) > _EXACT_M
+        or 6 * len(correction.poses) > LARGEST_POSTERIOR
+        or gap_of(observation, correction.poses, correction.dropped) > _EXACT_M
     ):
         return None
     return explain(observation, correction)
@@ -123,4 +123,4 @@ def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
         return
-    write_file(out, table(plan.assembly, plan.goals))
+    write_file(out, table(plan.assembly, plan.target_poses))

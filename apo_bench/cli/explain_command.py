@@ -42,7 +42,7 @@ def explain_command(
     if observation is None:
         loaded = load_scenario(scenario)
         seen = as_planned(loaded, deviation_mm, deviation_deg)
-        at: Any = seen.goals
+        at: Any = seen.poses
         where = f"at the nominal goals, {stated}"
     else:
         seen, loaded, assumed = read_observation_file(

@@ -46,6 +46,6 @@ def recognise_command(
     if assumed:
         typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
     typer.echo("\n" + "\n".join([*confidence_lines(form), *difference_lines(form)]))
-    if not seen.seen.all():
-        missing = ", ".join(str(k + 1) for k, was_seen in enumerate(seen.seen) if not was_seen)
+    if not seen.observed.all():
+        missing = ", ".join(str(k + 1) for k, was_seen in enumerate(seen.observed) if not was_seen)
         typer.echo(f"not seen, so nothing is recognised there: operation {missing}")

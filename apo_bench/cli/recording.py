@@ -81,7 +81,7 @@ def _import(
         name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
         write_form(observation_form(imported.observation, name), out)
     else:
-        _write_table(out, mains, rests, imported.observation.goals, camera)
+        _write_table(out, mains, rests, imported.observation.poses, camera)
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
     if picture is not None:

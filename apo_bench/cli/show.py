@@ -44,7 +44,7 @@ def show_command(
     _check_seen(observed, k)
     panels = []
     if seen or not corrected:
-        panels.append(belief_panel("as seen", observed, observed.goals, k))
+        panels.append(belief_panel("as seen", observed, observed.poses, k))
     if corrected or not seen:
         goals, notes = _correct(loaded, observed, method)
         panels.append(belief_panel(f"corrected by {method}", observed, goals, k, notes))
@@ -68,13 +68,13 @@ def _correct(scenario: Scenario, observed: Observation, method: str) -> tuple[Ar
         )
     planned = fitting_plan(correction, observed, scenario)
     notes = filter(None, (planned.sentence, plan_warning(scenario, planned.plan, correction)))
-    return planned.plan.goals, "; ".join(notes)
+    return planned.plan.target_poses, "; ".join(notes)
 
 
 def _check_seen(observed: Observation, step: int) -> None:
     """Nothing is known after an operation that was not seen."""
-    missed = int(observed.seen.argmin()) + 1
-    if observed.seen.all() or missed > step:
+    missed = int(observed.observed.argmin()) + 1
+    if observed.observed.all() or missed > step:
         return
     before = f"--seen --step {missed - 1} shows what is known before it" if missed > 1 else "nothing is known before it"
     raise RuntimeError(f"operation {missed} was not seen, so nothing is known after it; {before}.")

@@ -91,16 +91,16 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
         return returned if isinstance(chosen, ContactCorrector) else opposing(observation, returned)
     if not isinstance(returned, Correction):
         return goals_as_given(
-            observation, _bare(returned, len(observation.goals), name), "the corrector returned goals and no status"
+            observation, _bare(returned, len(observation.poses), name), "the corrector returned goals and no status"
         )
     require(
         returned.status in _STATUSES,
         f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}.",
     )
-    goals = _bare(returned.goals, len(observation.goals), name)
+    goals = _bare(returned.poses, len(observation.poses), name)
     returned = check_correction(returned, observation.assembly, name)
     if returned.ok and not _ours(chosen):
-        before = gap_of(observation, observation.goals)
+        before = gap_of(observation, observation.poses)
         returned = replace(returned, gap_before_m=before, gap_after_m=gap_of(observation, goals))
     return returned
 

@@ -146,17 +146,17 @@ def explain(observation: Observation, goals: Array | Correction, dropped: Collec
         hypotheses = goals.hypotheses
         dropped = (*goals.dropped, *dropped)
         observation = goals.believed or observation
-        goals = goals.goals
+        goals = goals.poses
     observation = lowered_observation(observation)
     n = len(goals)
     assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    problem = problem_of((replace(observation, goals=goals, shared=()),))
+    problem = problem_of((replace(observation, poses=goals, shared=()),))
     system = problem.laid.system.only(0)
     kept = problem.demands.exact & problem.without(tuple(dropped))
     # B = J_r(xi) L makes body twists at the goals of z, so J B is the derivative by z.
-    xi = pose.log(pose.inverse(observation.goals) @ goals)
+    xi = pose.log(pose.inverse(observation.poses) @ goals)
     Jr = right_jacobian(xi)
     B = Jr @ problem.L[0]
     _, Jt = linearised_by(system, goals, B)

@@ -23,12 +23,12 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
     if correction.covariance is None or not correction.ok:
         return None
     if not correction.hypotheses:
-        return _contains(correction.believed or observation, correction.goals, correction.dropped, truth, level)
+        return _contains(correction.believed or observation, correction.poses, correction.dropped, truth, level)
     each = np.sqrt(level)
     known = list[bool]()
     weight = 0.0
     for one in correction.hypotheses:
-        inside = _contains(one.believed, one.goals, one.dropped, truth, each)
+        inside = _contains(one.believed, one.poses, one.dropped, truth, each)
         known += [] if inside is None else [inside]
         weight += one.weight
         if weight >= each:
@@ -46,13 +46,13 @@ def _contains(believed: Observation, goals: Array, dropped: tuple[str, ...], tru
 
     observation = lowered_observation(believed)
     L = noise_factor(observation)
-    xi = pose.log(pose.inverse(observation.goals) @ goals)
+    xi = pose.log(pose.inverse(observation.poses) @ goals)
     system = seen_system(observation).among(_equal(observation, dropped))
     known = freedom_of(linearised_by(system, goals, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free
-    true = pose.log(pose.inverse(observation.goals) @ truth)
+    true = pose.log(pose.inverse(observation.poses) @ truth)
     # Deviation of the truth in the tangent space of the contacts, in standard deviations.
     off = free.T @ coordinates_of(L, true - xi)
     tailed = observation.tails is not None

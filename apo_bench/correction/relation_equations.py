@@ -165,7 +165,7 @@ def estimate_shared(
         InputError: Too many operations.
     """
     L = noise_factor(observation)
-    seen = observation.goals
+    seen = observation.poses
     known = freedom_of(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
     if known is None:
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")

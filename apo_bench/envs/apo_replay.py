@@ -240,7 +240,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         seen = observe_demonstration(simulated, noise, trial)
         look = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
         self._episode = Episode(trial, replace(simulated, images=None), seen, look)
-        self.aim(seen.goals)
+        self.aim(seen.poses)
         self._refused = observation_failure(seen)
         self._over = False
         self._rendering.begin(simulated.layout.start)
@@ -278,7 +278,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             correction: What the goals come from, so that what it doubts is in what the plan promises.
         """
         plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
-        self._aim = plan if targets is None else replace(plan, targets=targets)
+        self._aim = plan if targets is None else replace(plan, step_poses=targets)
         self._correction = correction
         self._refused = None
 
@@ -335,7 +335,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if predicted_success < self._abstain:
             return failed, abstained(predicted_success, self._abstain), predicted, predicted_success
         watch = self._rendering.watch(self._scene, self.render_mode)
-        attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, watch, self._fidelity)
+        attempt = carried_out(robot, plan, self._scene, simulated.layout.poses, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
             self._rendering.poses = attempt.result.reached.final.poses
         return verdicts(attempt.verdict), trial_outcome(attempt), predicted, predicted_success

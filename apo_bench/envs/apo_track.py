@@ -82,7 +82,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         """Watch another demonstration; `seed=k` is trial k."""
         super().reset(seed=seed)
         _, info = self._base.reset(seed=seed, options=options)
-        self._placed = np.array(self._base.seen.goals)
+        self._placed = np.array(self._base.seen.poses)
         self._schedule, self._targets = [], []
         self._done = self._acts = 0
         self._shown = min(1, len(self._placed))
@@ -132,7 +132,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 
     def action(self, act: Act) -> dict[str, Any]:
         """The action that is this act now."""
-        goal = self._base.seen.goals[self._done - act.undo]
+        goal = self._base.seen.poses[self._done - act.undo]
         twist = np.zeros(6) if act.undo else pose.log(pose.inverse(goal) @ act.target)
         return {"act": UNDO if act.undo else DO, "twist": twist}
 
@@ -148,7 +148,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         self._done -= undo
         k = self._done
         if not undo:
-            self._placed[k] = self._base.seen.goals[k] @ pose.exp(twist)
+            self._placed[k] = self._base.seen.poses[k] @ pose.exp(twist)
             self._done += 1
             self._shown = min(max(self._shown, self._done + 1), len(self._placed))
         self._schedule.append(Step(k, undo))
@@ -175,11 +175,11 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         seen: Observation = self._base.seen
         shown = np.arange(n) < self._shown
         done = np.arange(n) < self._done
-        goals = np.where(shown[:, None, None], seen.goals, np.eye(4))
+        goals = np.where(shown[:, None, None], seen.poses, np.eye(4))
         return {
-            "goals": packed(goals),
+            "poses": packed(goals),
             "covariance": np.where(shown[:, None, None], seen.covariance, 0.0),
-            "seen": (shown & seen.seen).astype(np.int8),
+            "observed": (shown & seen.observed).astype(np.int8),
             "shown": shown.astype(np.int8),
             "done": done.astype(np.int8),
             "placed": packed(np.where(done[:, None, None], self._placed, goals)),
@@ -193,7 +193,7 @@ def _judged_at(
     if simulated.demonstration.code != "ok":
         return _said(dict.fromkeys(VERDICTS, False), demonstration_failure(simulated.demonstration))
     reached = exactly_at(seen, goals)
-    verdict = judge(seen.assembly, reached, simulated.layout.goals, criteria)
+    verdict = judge(seen.assembly, reached, simulated.layout.poses, criteria)
     there = ReplayResult(reached, Outcome("done", "ok", None, sentence("ok")), 0.0, 0.0)
     return _said(verdicts(verdict), trial_outcome(Attempt(there, verdict)))
 

@@ -53,11 +53,11 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         """Watch another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
         correction = self._correct(self._base.seen, self._corrector, self._base.look)
-        goals = correction.goals
+        goals = correction.poses
         if correction.ok:
             plan = self._base.planned(correction)
-            goals = plan.goals
-            self._base.aim(goals, plan.schedule, plan.targets, correction)
+            goals = plan.target_poses
+            self._base.aim(goals, plan.schedule, plan.step_poses, correction)
         else:
             self._base.refuse(correction.status, correction.sentence)
         self._goals = packed(goals)
@@ -70,4 +70,4 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
 
     def _with_goals(self, seen: Seen) -> Seen:
         assert self._goals is not None
-        return {**seen, "goals": self._goals.copy()}
+        return {**seen, "poses": self._goals.copy()}

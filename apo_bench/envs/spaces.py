@@ -35,9 +35,9 @@ def observation_space(n: int) -> spaces.Dict:
     unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
     return spaces.Dict(
         {
-            "goals": spaces.Box(-far, far, dtype=np.float64),
+            "poses": spaces.Box(-far, far, dtype=np.float64),
             "covariance": spaces.Box(-unsure, unsure, dtype=np.float64),
-            "seen": spaces.MultiBinary(n),
+            "observed": spaces.MultiBinary(n),
         }
     )
 
@@ -54,7 +54,7 @@ def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
     several = spaces.MultiBinary(n)
     twist = spaces.Box(-_LARGEST_TWIST, _LARGEST_TWIST, dtype=np.float64)
     return (
-        spaces.Dict({**seen.spaces, "shown": several, "done": several, "placed": seen["goals"]}),
+        spaces.Dict({**seen.spaces, "shown": several, "done": several, "placed": seen["poses"]}),
         spaces.Dict({"act": spaces.Discrete(3), "twist": twist}),
     )
 
@@ -62,9 +62,9 @@ def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
 def as_seen_entries(observation: Observation) -> Seen:
     """Fresh copies of what was seen."""
     return {
-        "goals": packed(observation.goals),
+        "poses": packed(observation.poses),
         "covariance": observation.covariance.copy(),
-        "seen": observation.seen.astype(np.int8),
+        "observed": observation.observed.astype(np.int8),
     }
 
 
@@ -88,7 +88,9 @@ def moved(plan: Plan, action: Action, space: spaces.Space[Action]) -> Plan:
         )
     displacements = pose.exp(twist)
     done = [step.operation for step in plan.schedule]
-    return replace(plan, goals=plan.goals @ displacements, targets=plan.targets @ displacements[done])
+    return replace(
+        plan, target_poses=plan.target_poses @ displacements, step_poses=plan.step_poses @ displacements[done]
+    )
 
 
 MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)

@@ -145,7 +145,7 @@ class Trials(NamedTuple):
         if simulated.demonstration.code != "ok":
             return demonstration_failure(simulated.demonstration)
         seen = observe_demonstration(simulated, noise, trial)
-        made = apply_method(corrector, seen, simulated.layout.goals, where=scene)
+        made = apply_method(corrector, seen, simulated.layout.poses, where=scene)
         if made.plan is None:
             assert made.failure is not None
             return made.failure
@@ -156,11 +156,11 @@ class Trials(NamedTuple):
         start = prepare(made.plan, scene, k, error, probing, (robot.wrench, (*key, 1)))
         if isinstance(start, Outcome):
             return start
-        before = judged(scene, start.after, start.after[-1], simulated.layout.goals[:k]) if k else None
+        before = judged(scene, start.after, start.after[-1], simulated.layout.poses[:k]) if k else None
         if before is not None and not before.success:
             code = before.rests_on.code
             return Outcome("judge", code, None, f"what was put before is not right: {before.rests_on.why or code}")
-        return Begun(trial, start, made.plan, error, simulated.layout.goals, _stated(seen, made.correction, told))
+        return Begun(trial, start, made.plan, error, simulated.layout.poses, _stated(seen, made.correction, told))
 
     def go_on(self, begun: Begun, control: TipControl, reached: Snapshot) -> Begun | Outcome:
         """The start of the next operation, after somebody has done one; or what failed on the way there."""

@@ -43,7 +43,7 @@ Policy = Callable[[Tracked], tuple[Act, ...]]
 def paper_track_policy(known: Tracked) -> tuple[Act, ...]:
     """Free the 1, 2, .. most recent candidates until every contact holds: the corrector `paper-track`, act by act."""
     seen = lowered_observation(known.seen)
-    if not seen.seen.all():
+    if not seen.observed.all():
         return ()
     step = next_operation(seen, known.placed, nested)
     return _acts(known, step.goals, step.freed) if step.status == "converged" else ()
@@ -54,9 +54,9 @@ def contact_policy(known: Tracked) -> tuple[Act, ...]:
     correction = correct(known.seen, "contact")
     if not correction.ok:
         return ()
-    off = pose.log(pose.inverse(known.placed) @ correction.goals)[:-1].reshape(-1, 2, 3)
+    off = pose.log(pose.inverse(known.placed) @ correction.poses)[:-1].reshape(-1, 2, 3)
     m = np.linalg.norm(off, axis=2) @ [1.0, LENGTH_M]
-    return _acts(known, correction.goals, np.flatnonzero(m > known.seen.gap_m).tolist())
+    return _acts(known, correction.poses, np.flatnonzero(m > known.seen.gap_m).tolist())
 
 
 def _acts(known: Tracked, goals: Array, freed: list[int] | tuple[int, ...]) -> tuple[Act, ...]:
@@ -75,9 +75,9 @@ def first_seen(observation: Observation, m: int) -> Observation:
     return replace(
         observation,
         assembly=observation.assembly.first(m),
-        goals=observation.goals[:m],
+        poses=observation.poses[:m],
         covariance=observation.covariance[:m],
-        seen=observation.seen[:m],
+        observed=observation.observed[:m],
         shared=tuple(shared),
         tails=None if tails is None else replace(tails, frames=tails.frames[:m]),
     )

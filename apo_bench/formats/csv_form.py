@@ -70,11 +70,11 @@ def read_table(
     observation = Observation(
         assembly=assembly,
         start=layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
-        goals=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
+        poses=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
         covariance=np.array([np.diag([s] * 3 + [t] * 3) ** 2 for s, t in zip(shift, turn, strict=True)]).reshape(
             -1, 6, 6
         ),
-        seen=np.array([_flag(row) for row in ordered], dtype=np.bool_),
+        observed=np.array([_flag(row) for row in ordered], dtype=np.bool_),
         gap_m=scenario.gap_mm * 1e-3,
         play_m=_play(ordered, scenario.clearance_mm * 1e-3),
     )

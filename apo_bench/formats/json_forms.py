@@ -139,9 +139,9 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         ObservedOperation(
             operation=k + 1,
             part=operation.main,
-            **pose_form(observation.goals[k]),
+            **pose_form(observation.poses[k]),
             covariance_mm_deg=covariance_form(observation.covariance[k]),
-            seen=bool(observation.seen[k]),
+            seen=bool(observation.observed[k]),
         )
         for k, operation in enumerate(operations)
     ]
@@ -162,12 +162,12 @@ def observation_form(observation: Observation, scenario: str) -> Form:
 def plan_form(plan: Plan, scenario: str) -> Form:
     """The JSON form of a plan."""
     planned = [
-        PlannedOperation(operation=k + 1, part=operation.main, **pose_form(plan.goals[k]))
+        PlannedOperation(operation=k + 1, part=operation.main, **pose_form(plan.target_poses[k]))
         for k, operation in enumerate(plan.assembly.operations)
     ]
     schedule = []
-    for step, target in zip(plan.schedule, plan.targets, strict=True):
-        own = {} if np.array_equal(target, plan.goals[step.operation]) else pose_form(target)
+    for step, target in zip(plan.schedule, plan.step_poses, strict=True):
+        own = {} if np.array_equal(target, plan.target_poses[step.operation]) else pose_form(target)
         schedule.append(StepForm(operation=step.operation + 1, undo=step.undo, **own))
     form = PlanForm(
         schema="apo-bench/plan/2",

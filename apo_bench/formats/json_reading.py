@@ -74,9 +74,9 @@ def read_json_observed(
     observation = Observation(
         assembly=assembly,
         start=own_start if form.start is UNSET else _poses(file, form.start, assembly),
-        goals=_goals(file, form.operations),
+        poses=_goals(file, form.operations),
         covariance=np.array([_stated(file, entry, assumed) for entry in form.operations]).reshape(-1, 6, 6),
-        seen=np.array([entry.seen for entry in form.operations]),
+        observed=np.array([entry.seen for entry in form.operations]),
         gap_m=(loaded.gap_mm if form.gap_mm is UNSET else form.gap_mm) * 1e-3,
         play_m=(loaded.clearance_mm if form.play_mm is UNSET else form.play_mm) * 1e-3,
         outliers=None if form.outliers is UNSET else _outliers(file, form.outliers),

@@ -98,9 +98,9 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
     return Observation(
         assembly=scenario.assembly,
         start=layout.start,
-        goals=layout.goals,
+        poses=layout.poses,
         covariance=np.tile(covariance, (n, 1, 1)),
-        seen=np.ones(n, dtype=np.bool_),
+        observed=np.ones(n, dtype=np.bool_),
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,
     )

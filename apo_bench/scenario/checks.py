@@ -49,7 +49,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     require(tight is None, f"{file}, operations, contacts: {tight}; make the hole wider, or fit with a clearance.")
     apart: set[_Pair] = set()
     for case in _cases(scenario):
-        stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.goals))
+        stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.poses))
         if not case.key:
             check_order(scenario.assembly, stages, file)
         for key, fault in _faults(scenario, case, stages, apart):

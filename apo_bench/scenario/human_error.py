@@ -43,9 +43,9 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
     left = ()
     if scenario.human_error is None or not offset.any():
         return ErrorSpread(offsets, left)
-    stages = (layout.start, *placements(assembly, layout.start, layout.goals))
+    stages = (layout.start, *placements(assembly, layout.start, layout.poses))
     for k, operation in enumerate(assembly.operations):
-        R = layout.goals[k][:3, :3]
+        R = layout.poses[k][:3, :3]
         if k == scenario.human_error.operation:
             offsets[k] = offset
         elif k < len(assembly) - 1:

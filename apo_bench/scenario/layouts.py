@@ -41,7 +41,7 @@ def draw_layouts(scenario: Scenario, rng: np.random.Generator, n: int, clearance
     T_world_assembly[:, :3, 3] = place[:, :3]
     fit = scenario.clearance_mm if clearance_mm is None else clearance_mm
     nominal = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=fit)
-    goals = T_world_assembly[:, None] @ nominal.goals
+    goals = T_world_assembly[:, None] @ nominal.poses
     lengths, angles = np.split(drawn[:, 3:], [len(scenario.shifts)], axis=1)
     for shift, length in zip(scenario.shifts, lengths.T, strict=True):
         goals[:, shift.operation] = goals[:, shift.operation] @ pose.exp(np.outer(length, [*shift.axis, 0.0, 0.0, 0.0]))

@@ -90,7 +90,7 @@ def fitting_plan(correction: Correction, observation: Observation, where: Scene 
     goals = _goals_that_fit(plan, correction.believed or observation, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
-    return FittingPlan(plan.with_goals(goals), _moves(plan.goals, goals), why)
+    return FittingPlan(plan.with_target_poses(goals), _moves(plan.target_poses, goals), why)
 
 
 def _fault(scene: Scene, plan: Plan) -> str | None:
@@ -109,7 +109,7 @@ def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, 
 def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
     """Goals near those of a plan that does not fit at which it does, (n, 4, 4); None if none were found."""
     try:
-        space = free_space(believed, plan.goals)
+        space = free_space(believed, plan.target_poses)
     except InputError:
         return None
     if space is None:
@@ -118,7 +118,7 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
     allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
-        moved = plan.with_goals(goals)
+        moved = plan.with_target_poses(goals)
         held = all(
             (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
         )
@@ -134,7 +134,7 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
 
 def _excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
     """By how much each measure of a plan with other goals is too large."""
-    return np.array([measure.size for measure in _measured(scene, plan.with_goals(goals), room_mm)]) - limits
+    return np.array([measure.size for measure in _measured(scene, plan.with_target_poses(goals), room_mm)]) - limits
 
 
 def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:

@@ -231,9 +231,9 @@ def _held(observation: Observation, goals: Array) -> _Held:
 
 def _factor(observation: Observation) -> Array:
     """L of the observation, as if everything had been seen."""
-    if observation.seen.all():
+    if observation.observed.all():
         return noise_factor(observation)
-    covariance = np.where(observation.seen[:, None, None], observation.covariance, UNKNOWN)
+    covariance = np.where(observation.observed[:, None, None], observation.covariance, UNKNOWN)
     return noise_factor(
-        Observation(observation.assembly, observation.start, observation.goals, covariance, observation.seen)
+        Observation(observation.assembly, observation.start, observation.poses, covariance, observation.observed)
     )

@@ -157,7 +157,7 @@ def _truth(result: MethodResult, right: Assembly, corrector_input: Observation, 
         return {}
     correction = result.correction
     plan = result.plan
-    fixed, free = (None, None) if plan is None else goal_errors(right, plan.start, truth, plan.goals)
+    fixed, free = (None, None) if plan is None else goal_errors(right, plan.start, truth, plan.target_poses)
     return {
         "inside_95": contains_truth(corrector_input, correction, truth) if correction and correction.ok else None,
         "planned_error_fixed_mm": finite(fixed),

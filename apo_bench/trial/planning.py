@@ -38,26 +38,26 @@ def goals_by_heart(nominal: Array, observation: Observation) -> Array:
     Returns:
         (n, 4, 4), world frame.
     """
-    seen = np.flatnonzero(observation.seen)
+    seen = np.flatnonzero(observation.observed)
     # whitened by L^-1, where S = L L^t, a twist counts in standard deviations
     factors = [np.linalg.inv(np.linalg.cholesky(observation.covariance[k])) for k in seen]
 
     def residuals(place: Array) -> Array:
         T = _planar(place)
-        twists = [pose.log(pose.inverse(T @ nominal[k]) @ observation.goals[k]) for k in seen]
+        twists = [pose.log(pose.inverse(T @ nominal[k]) @ observation.poses[k]) for k in seen]
         return np.concatenate([L @ twist for L, twist in zip(factors, twists, strict=True)])
 
-    start = _rough(nominal[seen], observation.goals[seen])
+    start = _rough(nominal[seen], observation.poses[seen])
     return np.asarray(_planar(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
 
 
 def nominal_where_seen(nominal: Array, observation: Observation) -> Array:
     """The nominal goals (n, 4, 4) shifted and turned on the table to where the first operation was seen."""
-    k = int(np.argmax(observation.seen))
+    k = int(np.argmax(observation.observed))
     # of the whole motion from nominal to seen only the yaw and the shift on the table are taken
-    T = observation.goals[k] @ pose.inverse(nominal[k])
+    T = observation.poses[k] @ pose.inverse(nominal[k])
     flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
-    flat[:2, 3] = (observation.goals[k] - flat @ nominal[k])[:2, 3]
+    flat[:2, 3] = (observation.poses[k] - flat @ nominal[k])[:2, 3]
     return np.asarray(flat @ nominal)
 
 
@@ -114,7 +114,7 @@ def apply_method(
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _uncorrected(observation, truth, None)
     if isinstance(method, str) and method == "uncorrected":
-        return _uncorrected(observation, observation.goals, observation_failure(observation))
+        return _uncorrected(observation, observation.poses, observation_failure(observation))
     if isinstance(method, str) and method == "nominal" and where is not None:
         return _by_heart(observation, where)
     correction = correct(observation, with_simulated(method), look)
@@ -123,14 +123,16 @@ def apply_method(
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
     plan = correction.plan(observation)
     fitting = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where)
-    after_m = largest_gap(plan.assembly, plan.start, fitting.plan.goals) if fitting.moves else correction.gap_after_m
+    after_m = (
+        largest_gap(plan.assembly, plan.start, fitting.plan.target_poses) if fitting.moves else correction.gap_after_m
+    )
     return MethodResult(fitting.plan, None, correction.gap_before_m, after_m, correction, fitting)
 
 
 def _by_heart(observation: Observation, where: Scene | Scenario) -> MethodResult:
     scenario = where.scenario if isinstance(where, Scene) else where
-    if not observation.seen.any():
-        return _uncorrected(observation, observation.goals, observation_failure(observation))
+    if not observation.observed.any():
+        return _uncorrected(observation, observation.poses, observation_failure(observation))
     return _uncorrected(observation, goals_by_heart(scenario.goals, observation), None)
 
 
@@ -174,7 +176,7 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
     if plan is None:
         x, y = scenario.site.center_m
         at = layout_at(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
-        plan = Plan(scenario.assembly, at.start, at.goals)
+        plan = Plan(scenario.assembly, at.start, at.poses)
     moves = arm_moves(plan, scene)
     prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
     margins = [move.margin_deg for move in moves if move.margin_deg is not None]

@@ -75,14 +75,14 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
         believed: What the corrector was given.
         goals: (n, 4, 4), of the plan.
     """
-    blind = not believed.seen.any()
+    blind = not believed.observed.any()
     if correction is None:
         return (Explanation(1.0, believed, goals),)
     if not correction.hypotheses:
-        return (Explanation(1.0, correction.believed or believed, correction.goals, correction.dropped, blind),)
+        return (Explanation(1.0, correction.believed or believed, correction.poses, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
     share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
-    return tuple(Explanation(share * each.weight, each.believed, each.goals, each.dropped, blind) for each in likely)
+    return tuple(Explanation(share * each.weight, each.believed, each.poses, each.dropped, blind) for each in likely)
 
 
 def predict_success(
@@ -105,7 +105,7 @@ def predict_success(
         searches: The robot feels for a hole where a motion into it is stopped, as one with `+probe` does too.
         feels: The robot touches first, and makes up for its errors: what is left is how parts slip in its hand.
     """
-    explained = explanations(correction, believed, plan.goals)
+    explained = explanations(correction, believed, plan.target_poses)
     score = plan_score(plan, explained, where, robot_error, spiral, probing)
     return float(np.interp(score, SCORES, RATES))
 
@@ -230,7 +230,7 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
         ends: Where robots bring the parts, one with each of the errors that were drawn; none: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
-    ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.goals, strict=True)]
+    ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     every = partial(measures, plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
     stands = np.prod([_within(each, less_mm) for each in every() if each.kind in _WEIGHED or not ends])
@@ -253,7 +253,7 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
     """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
     scenario = where if isinstance(where, Scenario) else where.scenario
-    overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.goals)[-1], truths)
+    overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.target_poses)[-1], truths)
     possible = overlaps[np.isfinite(overlaps)]
     if not len(possible):
         return _UNKNOWN

@@ -35,8 +35,8 @@ class Rollout:
 def scenario_story(scene: Scene) -> Rollout:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
-    chapter = scenario_chapter(scene, layout.start, layout.goals)
-    return Rollout(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
+    chapter = scenario_chapter(scene, layout.start, layout.poses)
+    return Rollout(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
 
 
 def trial_story(
@@ -57,12 +57,12 @@ def trial_story(
     assert plan is not None
     method = row["method"]
     start = plan.start
-    goals = {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
-    if method == "uncorrected" or np.array_equal(seen.goals, plan.goals):
+    goals = {AS_SEEN: seen.poses, AS_CORRECTED: plan.target_poses}
+    if method == "uncorrected" or np.array_equal(seen.poses, plan.target_poses):
         del goals[AS_CORRECTED]
     chapters = []
     if simulated is not None:
-        goals[AS_TRUE] = simulated.layout.goals
+        goals[AS_TRUE] = simulated.layout.poses
         start = simulated.layout.start
         chapters.append(_demonstration(spec, scene, simulated))
     reached = Chapter(
@@ -73,7 +73,7 @@ def trial_story(
         ending=ending(row),
         good=row["success"],
     )
-    true = goals.get(AS_TRUE, plan.goals)
+    true = goals.get(AS_TRUE, plan.target_poses)
     return Rollout(scene, (*chapters, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
 
 

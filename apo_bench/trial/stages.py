@@ -163,9 +163,9 @@ def demonstration_failure(demonstration: Demonstration) -> Outcome:
 
 def observation_failure(observation: Observation) -> Outcome | None:
     """Why an observation cannot be replayed as it is: an operation was not seen. None if all were."""
-    if observation.seen.all():
+    if observation.observed.all():
         return None
-    k = int(np.argmin(observation.seen))
+    k = int(np.argmin(observation.observed))
     return Outcome("observe", "not_seen", k, sentence("not_seen", operation=k))
 
 

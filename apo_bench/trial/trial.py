@@ -86,7 +86,7 @@ def probing_config(
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if stated is None else robot_sigmas(stated)
-    belief = believe(sigmas, len(scene.arm.joints), plan.goals[:, :3, 3].mean(axis=0))
+    belief = believe(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
     return ProbingConfig(belief, slip_sigmas(sigmas), seed, ft_sensor, acts)
 
 
@@ -131,7 +131,7 @@ def run_trial(
     first |= {"demonstration": simulated.demonstration.code}
     if simulated.demonstration.code != "ok":
         return first | result(demonstration_failure(simulated.demonstration), success=None)
-    truth = simulated.layout.goals
+    truth = simulated.layout.poses
     noise = noise_of(settings, scene, simulated)
     observation = observe_demonstration(simulated, noise, settings.seed, settings.secret_seed)
     corrector_input = _corrector_input(settings, observation, truth)

@@ -119,7 +119,7 @@ def _test(test: Consistency | None, contradictory: bool) -> str:
 def _moved(observation: Observation, correction: Correction) -> Array:
     """How far each goal was moved and turned, (n, 2), [mm, degrees]."""
     # D = seen^-1 corrected: its log ends with the turn, whose size is an angle
-    D = pose.inverse(observation.goals) @ correction.goals
+    D = pose.inverse(observation.poses) @ correction.poses
     return np.column_stack(
         [np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(np.linalg.norm(pose.log(D)[..., 3:], axis=-1))]
     )
@@ -131,7 +131,7 @@ def _operations_form(observation: Observation, correction: Correction) -> list[d
         {
             "operation": k + 1,
             "part": operation.main,
-            **pose_form(correction.goals[k]),
+            **pose_form(correction.poses[k]),
             "moved_mm": float(moved[k, 0]),
             "turned_deg": float(moved[k, 1]),
             "covariance_mm_deg": None if correction.covariance is None else covariance_form(correction.covariance[k]),

@@ -49,7 +49,7 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
             "operations": [
                 pose_form(T)
                 | {"covariance_mm_deg": None if one.covariance is None else covariance_form(one.covariance[k])}
-                for k, T in enumerate(one.goals)
+                for k, T in enumerate(one.poses)
             ],
         }
         for one in hypotheses

@@ -59,11 +59,11 @@ def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Dra
     for _ in range(draws):
         observation = observe(demonstration, noise, rng)
         # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
-        Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3])
-        xi = (Q @ pose.log(pose.inverse(demonstration.goals) @ observation.goals)[..., None])[..., 0]
-        errors.append(xi[observation.seen])
+        Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.poses), 1, 2) @ observation.poses[:, :3, :3])
+        xi = (Q @ pose.log(pose.inverse(demonstration.poses) @ observation.poses)[..., None])[..., 0]
+        errors.append(xi[observation.observed])
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
-        variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.seen])
+        variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.observed])
     # x is across the ray and z along it; rx tilts it and rz turns about it
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
@@ -71,7 +71,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Dra
     return Drawn(
         four,
         np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale,
-        1.0 - len(four) / (draws * len(demonstration.goals)),
+        1.0 - len(four) / (draws * len(demonstration.poses)),
     )
 
 

@@ -58,7 +58,7 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     odls = plan.assembly.odls()
     relations = [plan.assembly.relations()[arc[0]] for arc in plan.assembly.arcs()]
     lines = []
-    for (k, undo), T in zip(plan.schedule, plan.targets, strict=True):
+    for (k, undo), T in zip(plan.schedule, plan.step_poses, strict=True):
         what = everything[k]
         before = spelled(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
         leaves, comes = (what.after, what.before) if undo else (what.before, what.after)

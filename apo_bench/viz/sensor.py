@@ -108,7 +108,7 @@ def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, An
     if event is None or event.found is None:
         return {"found": False}
     deviation = np.sqrt(np.diag(event.found.covariance))
-    error = pose.log(pose.inverse(event.found.T) @ run.simulated.demonstration.goals[k])
+    error = pose.log(pose.inverse(event.found.T) @ run.simulated.demonstration.poses[k])
     packed = pose.pack(event.found.T)
     return {
         "found": True,

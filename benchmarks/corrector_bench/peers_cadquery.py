@@ -53,8 +53,8 @@ def cadquery(observation: Observation) -> Correction:
             observation, lambda observation: _mated(module, observation), "the mates of the last poses were solved"
         )
     except _NoSolution:
-        now = largest_gap(observation.assembly, observation.start, observation.goals)
-        return Correction(observation.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
+        now = largest_gap(observation.assembly, observation.start, observation.poses)
+        return Correction(observation.poses, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
 
 
 def _check_flat(assembly: Assembly) -> None:
@@ -87,7 +87,7 @@ def _module() -> Any:
 def _mated(cq: Any, observation: Observation) -> Array:
     """The seen goals (n, 4, 4), those of parts that were last moved as the main part replaced."""
     operations = observation.assembly.operations
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     standing = [relation for relation in observation.assembly.relations() if relation.lost is None]
     last = {part: k for k, operation in enumerate(operations) for part in operation.moves}
     if not any(end.part in last for relation in standing for end in relation.contact):

@@ -25,8 +25,8 @@ def ceres(observation: Observation) -> Array:
     import pyceres
 
     space = whitened(observation)
-    n = len(observation.goals)
-    system = equations(observation.assembly, observation.start, observation.goals)
+    n = len(observation.poses)
+    system = equations(observation.assembly, observation.start, observation.poses)
 
     def contacts(z: Array) -> Array:
         return system.residual(space.goals(z)) / CONTACT_M

@@ -65,11 +65,11 @@ def _module() -> Any:
 
 def _solved(gtsam: Any, observation: Observation, contact_m: float) -> Array:
     whitened(observation)  # GTSAM takes a covariance that is none without a word
-    system = equations(observation.assembly, observation.start, observation.goals)
-    n = len(observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
+    n = len(observation.poses)
     graph = gtsam.NonlinearFactorGraph()
     values = gtsam.Values()
-    for k, (T, covariance) in enumerate(zip(observation.goals, observation.covariance, strict=True)):
+    for k, (T, covariance) in enumerate(zip(observation.poses, observation.covariance, strict=True)):
         noise = gtsam.noiseModel.Gaussian.Covariance(np.asfortranarray(covariance[np.ix_(_TURN_FIRST, _TURN_FIRST)]))
         graph.add(gtsam.PriorFactorPose3(k, gtsam.Pose3(T), noise))
         values.insert(k, gtsam.Pose3(T))
@@ -78,7 +78,7 @@ def _solved(gtsam: Any, observation: Observation, contact_m: float) -> Array:
         keys = list(one.variables(n))
         if keys:
             noise = gtsam.noiseModel.Isotropic.Sigma(len(one), contact_m)
-            graph.add(gtsam.CustomFactor(noise, keys, _error(one, observation.goals)))
+            graph.add(gtsam.CustomFactor(noise, keys, _error(one, observation.poses)))
     settings = gtsam.LevenbergMarquardtParams()
     settings.setLinearSolverType("MULTIFRONTAL_QR")
     settings.setRelativeErrorTol(_TOLERANCE)

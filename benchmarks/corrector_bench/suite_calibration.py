@@ -44,8 +44,8 @@ def _rows(name: str, per_part: bool, draws: int) -> list[TrialRecord]:
         refused += not made.ok
         alarms += made.test is None or made.test.p_value < NOISE_LEVEL
         said += bool(contains_truth(seen, made, given.truth, REGION))
-        found += spread(of, given, made.goals) <= bound
-        fixed_mm.append(1e3 * _across_m(of, given, made.goals))
+        found += spread(of, given, made.poses) <= bound
+        fixed_mm.append(1e3 * _across_m(of, given, made.poses))
     share = 100.0 / draws
     detail = {"draws": draws, "by geometry": found * share, "not converged": refused}
     rows = [

@@ -35,7 +35,7 @@ def _row(noise_level: str, draws: int) -> TrialRecord:
             a = apo_bench.correct(seen, plain)
             b = apo_bench.correct(seen, "contact")
             otherwise += (a.status, a.rank, a.sentence, a.dropped) != (b.status, b.rank, b.sentence, b.dropped)
-            off = max(off, 1e3 * float(np.abs(a.goals - b.goals).max()))
+            off = max(off, 1e3 * float(np.abs(a.poses - b.poses).max()))
             count = count + 1
     what = "goals compiled against not compiled, all scenarios, mm"
     return TrialRecord(

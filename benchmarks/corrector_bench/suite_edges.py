@@ -83,7 +83,7 @@ def _no_contacts() -> str:
     bare[1] = Operation(bare[1].main)
     bare[2] = Operation(bare[2].main, tuple(c for c in bare[2].contacts if c.environment.part != bare[1].main))
     made = corrected(observation(of, given, replace(of.assembly, operations=tuple(bare))))
-    kept = np.abs(made.goals[1] - given.seen[1]).max() < 1e-12
+    kept = np.abs(made.poses[1] - given.seen[1]).max() < 1e-12
     return made.sentence if made.ok and kept else f"wrong: {made.status}, moved {not kept}"
 
 
@@ -98,7 +98,7 @@ def _nothing() -> str:
 def _many() -> str:
     made, seen, z = _row_of_castles(MANY)
     left = 1e3 * made.gap_after_m
-    longer = _length(seen, made.goals) > float(np.linalg.norm(z))
+    longer = _length(seen, made.poses) > float(np.linalg.norm(z))
     right = made.ok and not longer and left < 1e-6
     return f"{'right' if right else 'wrong'}: {made.status}, gap {left:.1e} mm, rank {made.rank} of {10 * MANY - 7}"
 

@@ -31,7 +31,7 @@ def _row(name: str, noise_level: str, draws: int) -> TrialRecord:
         made = corrected(observation(of, given))
         off = float("inf")
         if made.covariance is not None:
-            off = freedom_error(of, given, made.goals, made.covariance)
+            off = freedom_error(of, given, made.poses, made.covariance)
         ranks += made.rank == of.rank
         right += made.rank == of.rank and off <= ALIKE
         widest = max(widest, off)

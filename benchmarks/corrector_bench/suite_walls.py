@@ -79,12 +79,12 @@ def _one(of: Problem, clearance_mm: float, seed: int) -> Walled:
     half = 0.5e-3 * clearance_mm
     made = corrected(observation(of, given, walled(of, half)))
     middle = corrected(observation(of, given), "contact")
-    outside = beyond(of, given, made.goals, half)
-    drift = pushed(of, given, made.goals, half)
-    length = np.linalg.norm(lengths(given, made.goals))
+    outside = beyond(of, given, made.poses, half)
+    drift = pushed(of, given, made.poses, half)
+    length = np.linalg.norm(lengths(given, made.poses))
     true = np.linalg.norm(lengths(given, given.truth))
     off, off_centred = (
-        1e3 * float(np.linalg.norm((goals - given.truth)[-1, :3, 3])) for goals in (made.goals, middle.goals)
+        1e3 * float(np.linalg.norm((goals - given.truth)[-1, :3, 3])) for goals in (made.poses, middle.poses)
     )
     overlong = bool(length > true * (1 + 1e-9))
     return Walled(made.ok, 1e3 * outside, overlong, off, off_centred, drift)

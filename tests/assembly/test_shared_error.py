@@ -60,8 +60,8 @@ def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     square = []
     for seed in range(600):
         seen = noise(shown.assembly, shown, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(seen.goals) @ shown.goals).ravel()
-        joint = joint_covariance(seen.goals, seen.covariance, seen.shared)
+        xi = pose.log(pose.inverse(seen.poses) @ shown.poses).ravel()
+        joint = joint_covariance(seen.poses, seen.covariance, seen.shared)
         square.append(xi @ np.linalg.solve(joint, xi))
     freedom = 6 * len(scene.goals)
     assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 600) + 0.02 * freedom)

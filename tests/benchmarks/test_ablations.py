@@ -32,14 +32,14 @@ def counted(found: Correction) -> tuple[int, ...]:
 
 def changed(given: Observation, found: Correction) -> set[int]:
     """The operations (from 1) whose goals are not as they were seen."""
-    return {k + 1 for k in np.flatnonzero((found.goals != given.goals).any(axis=(1, 2)))}
+    return {k + 1 for k in np.flatnonzero((found.poses != given.poses).any(axis=(1, 2)))}
 
 
 @pytest.mark.parametrize("name", CORRECTORS)
 def test_every_corrector_has_a_name_and_refuses_what_was_not_seen(name: str) -> None:
     given = seen("stick_in_tower")
     assert isinstance(correct(given, name), Correction)
-    blind = replace(given, seen=np.array([True, True, False]))
+    blind = replace(given, observed=np.array([True, True, False]))
     if name == "contact-robust":
         assert "; not seen: operation 3" in correct(blind, name).sentence
     else:
@@ -53,7 +53,7 @@ def test_every_corrector_has_a_name_and_refuses_what_was_not_seen(name: str) -> 
 def test_the_newest_motion_parameter_alone_does_not_suffice(name: str) -> None:
     given = seen(name)
     found = last_only(given)
-    n = len(given.goals)
+    n = len(given.poses)
     assert (found.status, found.schedule) == ("inconsistent", ())
     assert [one.free for one in found.tried] == [(n - 1,)]
     assert found.tried == paper_track(given).tried[:1]
@@ -66,7 +66,7 @@ def test_where_the_newest_suffices_it_is_as_tracking() -> None:
     whole = paper_track(given)
     assert (mine.tried, mine.schedule, mine.freed) == (whole.tried, whole.schedule, whole.freed)
     assert len(mine.tried) == 3
-    assert_array_equal(mine.goals, whole.goals)
+    assert_array_equal(mine.poses, whole.poses)
 
 
 # minimal
@@ -126,7 +126,7 @@ def relative(poses: dict[str, Array], a: str, b: str) -> Array:
 
 def test_without_history_the_stick_of_example_5_2_stays_as_crooked_in_the_cube_as_it_was_seen() -> None:
     given = seen("subassembly_on_castles", noise_level=1.0)
-    after = [dict(placements(given.assembly, given.start, g)[-1]) for g in (given.goals, no_history(given).goals)]
+    after = [dict(placements(given.assembly, given.start, g)[-1]) for g in (given.poses, no_history(given).poses)]
     assert_allclose(relative(after[1], "cube", "stick"), relative(after[0], "cube", "stick"), atol=1e-12)
     assert no_history(given).gap_after_m > 1e-3 > paper(given).gap_after_m
 
@@ -135,13 +135,13 @@ def test_without_history_the_stick_of_example_5_2_stays_as_crooked_in_the_cube_a
 def test_without_history_the_cubes_of_fig_6_stay_where_they_were_seen_on_the_stick(noise_level: float) -> None:
     given = seen("pockets", noise_level=noise_level)
     found = no_history(given)
-    assert_array_equal(found.goals[[1, 2, 4]], given.goals[[1, 2, 4]])
+    assert_array_equal(found.poses[[1, 2, 4]], given.poses[[1, 2, 4]])
     assert found.gap_after_m > 1e-3
 
 
 def test_without_history_the_end_of_the_simple_case_is_the_same() -> None:
     given = seen("stick_in_tower", noise_level=1.0)
-    assert_allclose(no_history(given).goals, paper(given).goals, atol=1e-12)
+    assert_allclose(no_history(given).poses, paper(given).poses, atol=1e-12)
 
 
 # no-disappeared
@@ -151,13 +151,13 @@ def test_without_what_disappeared_the_fixture_of_example_5_3_stays_wrong() -> No
     given = seen("fixture")
     found = no_disappeared(given)
     whole = paper(given)
-    system = equations(given.assembly, given.start, given.goals)
+    system = equations(given.assembly, given.start, given.poses)
     against = [str(relation.contact) for relation in given.assembly.relations()].index("castle2.py on cube.ny")
     assert (found.status, counted(found), counted(whole)) == ("converged", (5, 3, 1), (5, 3, 2, 1))
-    assert_array_equal(found.goals[1], given.goals[1])
-    assert system.gaps(found.goals)[against] == found.gap_after_m > 1e-3
-    assert system.gaps(whole.goals)[against] <= whole.gap_after_m < 1e-8
-    assert not np.array_equal(whole.goals[1], given.goals[1])
+    assert_array_equal(found.poses[1], given.poses[1])
+    assert system.gaps(found.poses)[against] == found.gap_after_m > 1e-3
+    assert system.gaps(whole.poses)[against] <= whole.gap_after_m < 1e-8
+    assert not np.array_equal(whole.poses[1], given.poses[1])
 
 
 def test_without_what_disappeared_the_first_cube_of_fig_6_is_no_candidate_but_settled() -> None:
@@ -165,10 +165,10 @@ def test_without_what_disappeared_the_first_cube_of_fig_6_is_no_candidate_but_se
     found = no_disappeared(given)
     assert counted(found) == (6, 5, 4, 3, 2)
     assert changed(given, found) == {1, 2, 3, 4, 5, 6}
-    assert_allclose(found.goals[0, 2], [0, 0, 1, 0.025], atol=1e-9)
+    assert_allclose(found.poses[0, 2], [0, 0, 1, 0.025], atol=1e-9)
 
 
 def test_where_nothing_disappeared_it_is_the_paper() -> None:
     given = seen("stick_in_tower", noise_level=2.0)
-    assert_array_equal(no_disappeared(given).goals, paper(given).goals)
+    assert_array_equal(no_disappeared(given).poses, paper(given).poses)
     assert no_disappeared(given).sentence == paper(given).sentence == "every contact holds within 0.1 mm"

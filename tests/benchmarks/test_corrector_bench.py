@@ -139,7 +139,7 @@ def test_walls_that_are_touched_may_hold_a_correction_back_and_others_may_not() 
     given = draw(of, "2/1", 4)
     middle = optimum(of, given).goals
     assert suite_walls.pushed(of, given, middle, half_m=0.01) > 0.1
-    between = corrected(observation(of, given, suite_walls.walled(of, 1e-4))).goals
+    between = corrected(observation(of, given, suite_walls.walled(of, 1e-4))).poses
     assert suite_walls.pushed(of, given, between, half_m=1e-4) < 1e-6
     assert suite_walls.beyond(of, given, between, half_m=1e-4) < 1e-9
     assert suite_walls.beyond(of, given, between, half_m=0.0) == pytest.approx(1e-4)

@@ -40,7 +40,7 @@ def test_what_has_less_than_was_asked_is_named() -> None:
 @pytest.mark.parametrize("stated", list(STATED))
 def test_a_draw_is_the_same_again_and_states_its_rate(stated: float) -> None:
     one, two = (drawn(Draw(3, "stale", stated)) for _ in range(2))
-    np.testing.assert_array_equal(one[2].goals, two[2].goals)
+    np.testing.assert_array_equal(one[2].poses, two[2].poses)
     assert one[2].outliers is not None
     assert one[2].outliers.gross == pytest.approx(one[1].failures[0].rate * stated)
     assert list(TITLES) == list(STATED)

@@ -4,11 +4,11 @@ import json
 import sys
 
 import pytest
-from benchmarks.robot_errors import page
 
 from apo_bench.simulation.execution.probing.feeling import ACTS
 from benchmarks import feel_acts
 from benchmarks.feel_acts import ALL, HALF_STEP, VARIANTS, Case, acts_of, lines_of, missing, settings_of, table
+from benchmarks.robot_errors import page
 
 HERE = ("stick_in_tower", "oracle+probe")
 

@@ -25,7 +25,7 @@ from tests.correction.baselines.test_baselines import noisy
 for name in ("stick_in_tower", "fixture"):
     seen = noisy(name)
     {check}
-blind = replace(seen, seen=~seen.seen)
+blind = replace(seen, observed=~seen.observed)
 assert correct(blind, {package}).sentence == "operation 1 was not seen"
 """
 AGREES = 'assert np.allclose(correct(seen, gtsam).goals, correct(seen, "least-squares").goals, atol=1e-7)'

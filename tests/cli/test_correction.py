@@ -150,7 +150,7 @@ def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str],
     made = json.loads(out)
     scenario = load_scenario("stick_in_tower")
     seen = read_observation(SEEN, scenario)
-    goals = read_observation(path, scenario).goals if ending == "csv" else read_plan(path, scenario).goals
+    goals = read_observation(path, scenario).poses if ending == "csv" else read_plan(path, scenario).target_poses
     assert largest_gap(seen.assembly, seen.start, goals) < 1e-12
     stated = [pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in made["operations"]]
     assert goals == pytest.approx(np.array(stated), abs=1e-12)
@@ -202,7 +202,7 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
     code, out, err = run(capsys, *asked(SEEN, "--method", method, "--json", "--out", str(tmp_path / "plan.json")))
     made = json.loads(out)
     assert (code, err, made["method"]) == (0, "", method)
-    assert len(read_plan(tmp_path / "plan.json").goals) == 3
+    assert len(read_plan(tmp_path / "plan.json").target_poses) == 3
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_what_was_seen_is_not_written_over(capsys: pytest.CaptureFixture[str], t
 
 def closed(seen: Observation) -> Correction:
     """Claims what it did not do."""
-    return Correction(seen.goals, "converged", "every gap is closed", (), 0.0, 0.0, 0)
+    return Correction(seen.poses, "converged", "every gap is closed", (), 0.0, 0.0, 0)
 
 
 def test_a_corrector_is_not_believed(capsys: pytest.CaptureFixture[str]) -> None:

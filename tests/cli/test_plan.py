@@ -173,7 +173,7 @@ def test_changing_one_motion_parameter_changes_one_line_of_the_plan(name: str) -
     for k in range(len(scenario.goals)):
         goals = np.array(scenario.goals)
         goals[k] = scenes.noisy(goals[k : k + 1], rng, 2.0, 2.0)[0]
-        after = plan_text(plan_lines(replace(nominal(scenario), goals=goals, targets=goals), scenario))
+        after = plan_text(plan_lines(replace(nominal(scenario), target_poses=goals, step_poses=goals), scenario))
         assert [i for i, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]] == [k + 1]
 
 
@@ -293,8 +293,8 @@ def test_a_line_that_cannot_be_one_is_refused(tmp_path: Path, attach: str, words
 def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng([5, 0]))
-    done = moves(Plan(scenario.assembly, layout.start, layout.goals), build_scene(scenario))
-    stages = placements(scenario.assembly, layout.start, layout.goals)
+    done = moves(Plan(scenario.assembly, layout.start, layout.poses), build_scene(scenario))
+    stages = placements(scenario.assembly, layout.start, layout.poses)
     for move, what in zip(done, nominal_operations(scenario), strict=True):
         t = move.transfer
         T = stages[what.operation][what.main]

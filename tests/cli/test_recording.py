@@ -38,12 +38,12 @@ def run(folder: Path, *more: str) -> int:
 
 
 def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).goals
+    wanted = layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).poses
     extra = ("--picture", str(folder / "p.png"), "--paths", str(folder / "p.csv"))
     for out, more in (("a.json", ("--scenario", NAME, *extra)), ("a.csv", ("--scenario", NAME)), ("b.csv", ())):
         assert run(folder, "--out", str(folder / out), *more) == 0
         found = read_observation(folder / out, NAME)
-        assert np.abs(pose.log(pose.inverse(wanted) @ found.goals)[:, :3]).max() < 1e-3
+        assert np.abs(pose.log(pose.inverse(wanted) @ found.poses)[:, :3]).max() < 1e-3
     said = capsys.readouterr().out
     assert "read as  lengths in mm; quaternions by the names of the columns" in " ".join(said.split("\n")[1].split(" "))
     assert (folder / "p.png").stat().st_size > 10_000

@@ -31,14 +31,14 @@ def nominal(scenario: Scenario, sigma: float = 1.0) -> Observation:
 
 def explained(name: str) -> tuple[Observation, Explanation]:
     seen = nominal(load_scenario(name))
-    return seen, explain(seen, seen.goals)
+    return seen, explain(seen, seen.poses)
 
 
 def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> float:
     """What is left of the contacts when goal k has moved and some later ones adapt."""
-    goals = np.array(seen.goals)
+    goals = np.array(seen.poses)
     goals[k] = goals[k] @ pose.exp(STEP * twist)
-    system = equations(seen.assembly, seen.start, seen.goals)
+    system = equations(seen.assembly, seen.start, seen.poses)
     free = tuple(adapting)
     if not free:
         return float(np.abs(system.residual(goals)).max())
@@ -49,7 +49,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
 @pytest.mark.parametrize("name", ["pocket_table", "dovetail", "gearbox"])
 def test_ranks_and_freedoms_add_up(name: str) -> None:
     seen, found = explained(name)
-    assert (sum(o.rank for o in found.operations), found.rank + found.freedom) == (found.rank, 6 * len(seen.goals))
+    assert (sum(o.rank for o in found.operations), found.rank + found.freedom) == (found.rank, 6 * len(seen.poses))
     assert sum(len(o.free) for o in found.operations) == found.freedom
     for o in (*found.operations, *found.parts):
         assert (len(o.free), len(o.fixed)) == (6 - o.rank, o.rank)
@@ -62,7 +62,7 @@ def test_free_directions_are_free_and_the_others_are_not(name: str) -> None:
     for o in found.operations:
         for free in o.free:
             assert gap_m(seen, o.operation, free.direction.twist, free.along) < 1e-9
-        later = range(o.operation + 1, len(seen.goals))
+        later = range(o.operation + 1, len(seen.poses))
         span = np.column_stack([np.zeros(6), *(free.direction.twist for free in o.free)])
         for i in range(6):
             beyond = np.eye(6)[i] - span @ np.linalg.lstsq(span, np.eye(6)[i], rcond=None)[0]
@@ -103,7 +103,7 @@ def _rank_with(seen: Observation, names: list[str], k: int) -> int:
         for j, operation in enumerate(seen.assembly.operations)
     )
     fewer = replace(seen, assembly=Assembly(seen.assembly.solids, operations, seen.assembly.fixed))
-    return explain(fewer, seen.goals).operations[k].rank
+    return explain(fewer, seen.poses).operations[k].rank
 
 
 def test_walls_leave_a_part_free_between_them() -> None:
@@ -120,7 +120,7 @@ def test_walls_leave_a_part_free_between_them() -> None:
 
 def test_dropped_relations_hold_nothing() -> None:
     seen, _ = explained("stick_in_tower")
-    found = explain(seen, seen.goals, ("R4",))
+    found = explain(seen, seen.poses, ("R4",))
     assert [o.fixed for o in found.operations][1] == ("z", "roll", "pitch")
     assert "R4" not in {hold.relation for o in found.operations for hold in (*o.through, *o.agreeing)}
     assert (found.rank, found.rank + found.redundant) == (11, 3 * (9 - 3))
@@ -147,13 +147,13 @@ def test_the_error_of_a_carried_part_goes_through_its_history() -> None:
 def test_the_posterior_of_parts_is_that_of_draws() -> None:
     scenario = load_scenario("pocket_table")
     seen = nominal(scenario, 1e-3)
-    found = explain(seen, seen.goals)
+    found = explain(seen, seen.poses)
     rng = np.random.default_rng(0)
     drawn = []
     for _ in range(150):
-        xi = 1e-6 * rng.standard_normal((len(seen.goals), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
-        made = contact(replace(seen, goals=seen.goals @ pose.exp(xi)))
-        at = placements(seen.assembly, seen.start, made.goals)[-1]
+        xi = 1e-6 * rng.standard_normal((len(seen.poses), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
+        made = contact(replace(seen, poses=seen.poses @ pose.exp(xi)))
+        at = placements(seen.assembly, seen.start, made.poses)[-1]
         drawn.append([pose.log(pose.inverse(part.pose) @ at[part.part]) for part in found.parts])
     spread = np.sqrt(np.mean(np.square(drawn), axis=0))
     stated = np.array([part.deviations for part in found.parts])

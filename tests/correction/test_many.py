@@ -41,7 +41,7 @@ def check_same(many: tuple[Correction, ...], single: list[Correction]) -> None:
     assert len(many) == len(single)
     for a, b in zip(many, single, strict=True):
         assert (a.status, a.sentence, a.freed, a.rank, a.dropped) == (b.status, b.sentence, b.freed, b.rank, b.dropped)
-        assert_allclose(a.goals, b.goals, rtol=0, atol=1e-9)
+        assert_allclose(a.poses, b.poses, rtol=0, atol=1e-9)
         assert a.gap_before_m == pytest.approx(b.gap_before_m, rel=0, abs=0, nan_ok=True)
         assert (a.test is None) == (b.test is None)
         assert (a.covariance is None) == (b.covariance is None)
@@ -71,7 +71,7 @@ def test_vertices_of_either_face(name: str) -> None:
     laid = pattern(scene.assembly).laid
     assert laid.any()
     assert not laid.all()
-    goals = np.array([one.goals for one in draws(scene, 5, 10.0, 8.0)])
+    goals = np.array([one.poses for one in draws(scene, 5, 10.0, 8.0)])
     together = laid_together(scene, goals)
     for i, each in enumerate(goals):
         one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
@@ -91,7 +91,7 @@ def test_more_than_fit_into_a_chunk() -> None:
     assert len(many) == len(seen)
     corrector = ContactCorrector()
     for i in (0, BATCH - 1, BATCH, 2 * BATCH - 1, 2 * BATCH, 2 * BATCH + 2):
-        assert_allclose(many[i].goals, corrector(seen[i]).goals, rtol=0, atol=1e-9)
+        assert_allclose(many[i].poses, corrector(seen[i]).poses, rtol=0, atol=1e-9)
 
 
 def test_the_same_with_walls() -> None:
@@ -117,15 +117,15 @@ def test_the_same_with_wrong_relations(doubt: str) -> None:
     assert {made.status for made in many} == {"converged" if doubt == "drop" else "inconsistent"}
     for a, b in zip(many, single, strict=True):
         if a.ok:
-            assert_allclose(a.goals, b.goals, rtol=0, atol=1e-9)
+            assert_allclose(a.poses, b.poses, rtol=0, atol=1e-9)
 
 
 def test_one_that_was_not_seen_is_refused_alone() -> None:
     seen = draws(scenes.stick_in_tower(), 3)
-    seen[1] = replace(seen[1], seen=np.array([True, False, True]))
+    seen[1] = replace(seen[1], observed=np.array([True, False, True]))
     many = correct_many(seen, contact)
     assert [made.status for made in many] == ["converged", "not_seen", "converged"]
-    assert_allclose(many[1].goals, seen[1].goals, rtol=0, atol=0)
+    assert_allclose(many[1].poses, seen[1].poses, rtol=0, atol=0)
 
 
 def test_none_at_all() -> None:
@@ -156,7 +156,7 @@ def test_no_operations_and_no_contacts() -> None:
     seen = [replace(one, assembly=bare) for one in draws(scene, 3)]
     for made, one in zip(correct_many(seen, contact), seen, strict=True):
         assert made.ok
-        assert_allclose(made.goals, one.goals, rtol=0, atol=0)
+        assert_allclose(made.poses, one.poses, rtol=0, atol=0)
     still = scenes.Scene(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4)))
     nothing = scenes.seen(still, still.goals)
     assert [made.status for made in correct_many([nothing, nothing], contact)] == ["converged", "converged"]
@@ -165,10 +165,10 @@ def test_no_operations_and_no_contacts() -> None:
 def test_by_default_they_are_corrected_as_one_is() -> None:
     """Of four one has a part seen elsewhere, and one a part that was not seen."""
     plain = draws(scenes.stick_on_castles(), 4)
-    goals = np.array(plain[1].goals)
+    goals = np.array(plain[1].poses)
     goals[1] = goals[1] @ pose.exp([0.3, 0.2, 0.1, 1.0, 0.5, 0.2])
     n = len(goals)
-    seen = [plain[0], replace(plain[1], goals=goals), replace(plain[2], seen=np.arange(n) != 1), plain[3]]
+    seen = [plain[0], replace(plain[1], poses=goals), replace(plain[2], observed=np.arange(n) != 1), plain[3]]
     made = correct_many(seen)
     check_same(made, [correct(one) for one in seen])
     assert [one.left_out for one in made[:2]] == [(), (1,)]

@@ -38,22 +38,22 @@ def nonsense(seen):
     return "goals"
 
 def imaginary(seen):
-    return seen.goals * (1 + 0j)
+    return seen.poses * (1 + 0j)
 
 def wide(seen):
-    goals = np.array(seen.goals)
+    goals = np.array(seen.poses)
     goals[:, 0, 3] = 1e9
     return Correction(goals, "converged", "far", (), 0.0, 0.0, 0)
 
 def odd(seen):
-    return Correction(seen.goals, "converged", "odd", (0.5,), 0.0, 0.0, 0)
+    return Correction(seen.poses, "converged", "odd", (0.5,), 0.0, 0.0, 0)
 
 def red(seen):
-    return Correction(seen.goals, "converged", "\\x1b[31m red", (), 0.0, 0.0, 0)
+    return Correction(seen.poses, "converged", "\\x1b[31m red", (), 0.0, 0.0, 0)
 
 class Asking:
     def __call__(self, seen):
-        return seen.goals
+        return seen.poses
 
     def looking(self, seen, look):
         raise ValueError(f"{look.left} looks")
@@ -95,7 +95,7 @@ def row_of(scene: Scene, method: str, **more: Any) -> dict[str, Any]:
 
 
 def test_a_function_named_by_its_module_is_asked_as_one_by_name() -> None:
-    assert correct(SEEN, "users:contact").goals.tobytes() == correct(SEEN, "contact").goals.tobytes()
+    assert correct(SEEN, "users:contact").poses.tobytes() == correct(SEEN, "contact").poses.tobytes()
 
 
 @pytest.mark.parametrize("name", MISBEHAVED)

@@ -29,12 +29,12 @@ def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Seque
     for k, undo in schedule:
         first = k not in seen or undo
         off = pose.at(1e-3 * np.array(wrong_mm[k])) if first and k in wrong_mm else np.eye(4)
-        targets.append(layout.goals[k] @ off)
+        targets.append(layout.poses[k] @ off)
         seen |= {k} if not undo else set()
         if undo:
             wrong_mm = {j: w for j, w in wrong_mm.items() if j != k}
-    plan = Plan(scene.scenario.assembly, layout.start, layout.goals, schedule, np.array(targets))
-    return replay_and_judge(plan, scene, layout.goals, fidelity="near-contact")
+    plan = Plan(scene.scenario.assembly, layout.start, layout.poses, schedule, np.array(targets))
+    return replay_and_judge(plan, scene, layout.poses, fidelity="near-contact")
 
 
 def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:
@@ -81,6 +81,6 @@ def test_a_collision_names_what_was_struck() -> None:
     scene = scene_of("block_on_block")
     layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
     there = {**layout.start, "A": layout.start["B"] @ pose.at((0.06, 0.0, 0.0))}
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene, parts_at=there)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene, parts_at=there)
     assert (result.outcome.stage, result.outcome.code) == ("pick", "collision")
     assert result.outcome.sentence == "the arm struck A in operation 1"

@@ -50,20 +50,20 @@ def test_each_kind_fixes_what_a_table_says(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_jacobian_is_that_of_finite_differences(kind):
     observation, _ = case(kind)
-    system = equations(observation.assembly, observation.start, observation.goals)
-    _, J = system.linearised(observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
+    _, J = system.linearised(observation.poses)
     step = 1e-6
     for column in range(12):
         xi = np.zeros((2, 6))
         xi.flat[column] = step
-        ends = [system.residual(observation.goals @ pose.exp(sign * xi)) for sign in (1.0, -1.0)]
+        ends = [system.residual(observation.poses @ pose.exp(sign * xi)) for sign in (1.0, -1.0)]
         np.testing.assert_allclose(J[:, column], (ends[0] - ends[1]) / (2 * step), atol=1e-8)
 
 
 @pytest.mark.parametrize("kind", ["shaft in hole", "cone in cone", "cone on rim"])
 def test_any_two_perpendicular_planes_through_an_axis_give_the_same_goals(kind):
     observation, _ = case(kind, seed=3)
-    known = correct(observation).goals
+    known = correct(observation).poses
     solids = observation.assembly.solids
     for turn in (0.3, 1.1, 2.5):
         toward = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -72,7 +72,7 @@ def test_any_two_perpendicular_planes_through_an_axis_give_the_same_goals(kind):
             for name, solid in solids.items()
         }
         other = replace(observation, assembly=replace(observation.assembly, solids=turned))
-        np.testing.assert_allclose(correct(other).goals, known, atol=1e-9)
+        np.testing.assert_allclose(correct(other).poses, known, atol=1e-9)
 
 
 def violated(kind, goals):
@@ -101,21 +101,21 @@ def test_the_goals_are_those_of_an_independent_solver(kind):
     observation, truth = case(kind, seed=1)
     assert np.abs(violated(kind, truth)).max() < 1e-12
     made = correct(observation)
-    assert np.abs(violated(kind, made.goals)).max() < 1e-9
+    assert np.abs(violated(kind, made.poses)).max() < 1e-9
     scale = np.sqrt(np.diagonal(observation.covariance, axis1=1, axis2=2))
 
     def goals(z):
-        return observation.goals @ pose.exp(z.reshape(2, 6) * scale)
+        return observation.poses @ pose.exp(z.reshape(2, 6) * scale)
 
     found = minimize(
         lambda z: z @ z, np.zeros(12), jac=lambda z: 2 * z, method="SLSQP",
         constraints={"type": "eq", "fun": lambda z: 1e3 * violated(kind, goals(z))},
         options={"maxiter": 200, "ftol": 1e-14},
     )  # fmt: skip
-    z = pose.log(pose.inverse(observation.goals) @ made.goals) / scale
+    z = pose.log(pose.inverse(observation.poses) @ made.poses) / scale
     assert found.success
     assert (z * z).sum() == pytest.approx(found.fun, rel=1e-5)
-    np.testing.assert_allclose(made.goals, goals(found.x), atol=2e-6)
+    np.testing.assert_allclose(made.poses, goals(found.x), atol=2e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -135,8 +135,8 @@ def test_the_test_and_the_regions_hold_what_they_say(kind):
 def test_compiled_and_plain_solvers_agree(kind):
     observation, _ = case(kind, seed=2)
     plain = ContactCorrector(compiled=False)(observation)
-    np.testing.assert_allclose(contact(observation).goals, plain.goals, atol=1e-9)
-    np.testing.assert_allclose(correct_many([observation, observation], contact)[1].goals, plain.goals, atol=1e-9)
+    np.testing.assert_allclose(contact(observation).poses, plain.poses, atol=1e-9)
+    np.testing.assert_allclose(correct_many([observation, observation], contact)[1].poses, plain.poses, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -145,7 +145,7 @@ def test_correctors_close_round_contacts(kind, method):
     observation, _ = case(kind, seed=4)
     made = correct(observation, method)
     assert made.ok, made.sentence
-    assert largest_gap(observation.assembly, observation.start, made.goals) <= observation.gap_m
+    assert largest_gap(observation.assembly, observation.start, made.poses) <= observation.gap_m
 
 
 def test_a_missing_view_is_inferred_from_a_round_contact():
@@ -156,10 +156,10 @@ def test_a_missing_view_is_inferred_from_a_round_contact():
         assert made.ok, made.sentence
         assert made.left_out == (1,)
         assert made.believed.assembly is observation.assembly
-        error = pose.log(pose.inverse(truth[1]) @ made.goals[1])
+        error = pose.log(pose.inverse(truth[1]) @ made.poses[1])
         if kind == "cone in cone":
             assert np.abs(np.delete(error, free)).max() < 0.01
-        assert np.abs(violated(kind, made.goals)).max() < 1e-6
+        assert np.abs(violated(kind, made.poses)).max() < 1e-6
 
 
 def test_a_wrong_relation_is_named_as_it_was_given():
@@ -176,21 +176,21 @@ def test_a_wrong_relation_is_named_as_it_was_given():
     assert {c for suspect in made.test.suspects for c in suspect.contacts} == {
         bore, top, touching("plate.bottom", "table.top"),
     }  # fmt: skip
-    assert largest_gap(lowered(observation.assembly), start, made.goals) > 1e-3
+    assert largest_gap(lowered(observation.assembly), start, made.poses) > 1e-3
 
 
 def test_cones_must_oppose_and_axes_need_not():
     """A pin that was seen upside down stands as well in its hole, but not in a countersink."""
     over = tilted((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
     observation, _ = case("shaft in hole")
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[1] = goals[1] @ over
-    assert correct(replace(observation, goals=goals)).ok
+    assert correct(replace(observation, poses=goals)).ok
     observation, _ = case("cone in cone")
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[1] = goals[1] @ over
-    assert correct(replace(observation, goals=goals), "paper").status == "inconsistent"
-    assert "look the same way" in correct(replace(observation, goals=goals), "paper").sentence
+    assert correct(replace(observation, poses=goals), "paper").status == "inconsistent"
+    assert "look the same way" in correct(replace(observation, poses=goals), "paper").sentence
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -201,7 +201,7 @@ def test_far_from_the_truth_goals_are_found_and_none_longer_than_it(kind):
         made = correct(observation)
         assert made.ok, made.sentence
         scale = np.sqrt(np.diagonal(observation.covariance, axis1=1, axis2=2))
-        found, true = (pose.log(pose.inverse(observation.goals) @ T) / scale for T in (made.goals, truth))
+        found, true = (pose.log(pose.inverse(observation.poses) @ T) / scale for T in (made.poses, truth))
         assert (found * found).sum() <= (true * true).sum() * (1 + 1e-9)
 
 
@@ -221,7 +221,7 @@ def test_a_hole_over_a_shaft_and_a_shaft_in_a_hole_are_the_same():
     assembly, start, truth = scene(bore, at=IN_BORE)
     other = scene(type(bore)(bore.environment, bore.manipulated), at=IN_BORE)[0]
     given, swapped = (seen(a, start, truth, np.random.default_rng(0)) for a in (assembly, other))
-    np.testing.assert_allclose(correct(given).goals, correct(swapped).goals, atol=1e-12)
+    np.testing.assert_allclose(correct(given).poses, correct(swapped).poses, atol=1e-12)
     assert {lowered(other).given(r.contact) for r in lowered(other).relations()} == {
         contact for operation in other.operations for contact in operation.contacts
     }
@@ -242,7 +242,7 @@ def test_play_of_a_round_fit_is_a_disc(radius, fit, play):
     for seed in range(4):
         made = correct(seen(loose, start, truth, np.random.default_rng(seed), play_m=0.25e-3))
         assert made.ok
-        local = pose.inverse(made.goals[0]) @ made.goals[1]
+        local = pose.inverse(made.poses[0]) @ made.poses[1]
         at = local[:3, 3]
         along = local[:3, 2]
         ends = [(at + (z - at[2]) / along[2] * along)[:2] for z in (0.0, 20 * MM)]
@@ -291,11 +291,11 @@ def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
 def test_parts_of_any_pieces_settle():
     """A pin seen 2 mm above where it lies comes down."""
     observation, truth = case("shaft on plane", mm=1e-3, deg=1e-3)
-    raised = np.array(observation.goals)
+    raised = np.array(observation.poses)
     raised[1, 2, 3] += 2 * MM
-    made = correct(replace(observation, goals=raised), with_simulated("physics-settle"))
+    made = correct(replace(observation, poses=raised), with_simulated("physics-settle"))
     assert made.ok, made.sentence
-    assert made.goals[1, 2, 3] == pytest.approx(truth[1, 2, 3], abs=0.1 * MM)
+    assert made.poses[1, 2, 3] == pytest.approx(truth[1, 2, 3], abs=0.1 * MM)
 
 
 @pytest.mark.parametrize(
@@ -326,13 +326,13 @@ def test_errors_that_operations_share_are_used():
     )
     made = correct(both)
     assert made.ok, made.sentence
-    apart = pose.inverse(pose.inverse(truth[0]) @ truth[1]) @ pose.inverse(made.goals[0]) @ made.goals[1]
+    apart = pose.inverse(pose.inverse(truth[0]) @ truth[1]) @ pose.inverse(made.poses[0]) @ made.poses[1]
     assert np.abs(pose.log(apart)).max() < 1e-4
 
 
 def test_a_look_settles_what_a_round_contact_leaves_open():
     observation, truth = case("shaft in hole", mm=0.3, deg=0.3)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[1] = goals[1] @ tilted((80.0, 40.0, 30.0), (90.0, 20.0, 0.0))
 
     class Again:
@@ -341,11 +341,11 @@ def test_a_look_settles_what_a_round_contact_leaves_open():
         def __call__(self, operations):
             self.left -= 1
             fresh = seen(observation.assembly, observation.start, truth, np.random.default_rng(self.left), 0.3, 0.3)
-            return replace(fresh, seen=np.isin(np.arange(2), operations))
+            return replace(fresh, observed=np.isin(np.arange(2), operations))
 
-    made = correct(replace(observation, goals=goals), "contact-robust", Again())
+    made = correct(replace(observation, poses=goals), "contact-robust", Again())
     assert made.ok, made.sentence
-    assert np.abs(pose.log(pose.inverse(truth) @ made.goals)[:, :3]).max() < 2 * MM
+    assert np.abs(pose.log(pose.inverse(truth) @ made.poses)[:, :3]).max() < 2 * MM
 
 
 def test_a_lying_shaft_rolls_and_a_roof_of_two_planes_holds_it_on_a_line():
@@ -374,7 +374,7 @@ def test_a_corrector_of_ones_own_gets_the_round_faces():
 
     def own(seen):
         given.append(seen)
-        return seen.goals
+        return seen.poses
 
     correct(observation, own)
     assert given[0].assembly is observation.assembly

@@ -240,5 +240,5 @@ def test_the_example_of_an_observation_file_is_read_as_the_table_that_it_repeats
     path = tmp_path / "seen.json"
     path.write_text(example, encoding="utf-8")
     seen, table = (read_observation(one, "stick_in_tower") for one in (path, ROOT / "docs" / "seen.csv"))
-    assert seen.goals.tolist() == table.goals.tolist()
+    assert seen.poses.tolist() == table.poses.tolist()
     assert np.allclose(seen.covariance, table.covariance, rtol=1e-12)

@@ -69,16 +69,20 @@ def zeros(env: Any) -> Any:
 
 
 def gives_up(seen: Observation) -> Correction:
-    return Correction(seen.goals, "inconsistent", "the contacts cannot all hold", (), 1e-3, 1e-3, 0)
+    return Correction(seen.poses, "inconsistent", "the contacts cannot all hold", (), 1e-3, 1e-3, 0)
 
 
 def test_reset_fits_the_spaces(env: APOReplay) -> None:
     seen, info = env.reset(seed=SEED)
     assert env.observation_space.contains(seen)
-    assert {key: value.shape for key, value in seen.items()} == {"goals": (3, 7), "covariance": (3, 6, 6), "seen": (3,)}
+    assert {key: value.shape for key, value in seen.items()} == {
+        "poses": (3, 7),
+        "covariance": (3, 6, 6),
+        "observed": (3,),
+    }
     assert all(np.isfinite(box.low).all() and np.isfinite(box.high).all() for box in _boxes(env))
     assert env.action_space.shape == (3, 6)
-    np.testing.assert_array_equal(seen["goals"], pose.pack(env.seen.goals))
+    np.testing.assert_array_equal(seen["poses"], pose.pack(env.seen.poses))
     np.testing.assert_array_equal(seen["covariance"], env.seen.covariance)
     assert env.seen.assembly is env.assembly
     assert info == {"demonstration": "ok"}
@@ -86,7 +90,7 @@ def test_reset_fits_the_spaces(env: APOReplay) -> None:
 
 
 def _boxes(env: APOReplay) -> list[Any]:
-    return [env.action_space, env.observation_space["goals"], env.observation_space["covariance"]]
+    return [env.action_space, env.observation_space["poses"], env.observation_space["covariance"]]
 
 
 def test_a_learner_may_write_into_what_it_was_given(env: APOReplay) -> None:
@@ -103,10 +107,10 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
     first, _ = env.reset(seed=SEED)
     other, _ = env.reset()
     drawn, _ = env.reset(seed=SEED)
-    assert not np.array_equal(first["goals"], other["goals"])
-    np.testing.assert_array_equal(first["goals"], drawn["goals"])
+    assert not np.array_equal(first["poses"], other["poses"])
+    np.testing.assert_array_equal(first["poses"], drawn["poses"])
     after, _ = env.reset()
-    np.testing.assert_array_equal(other["goals"], after["goals"])
+    np.testing.assert_array_equal(other["poses"], after["poses"])
 
 
 def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
@@ -149,8 +153,8 @@ def test_an_action_moves_each_goal_in_the_frame_of_its_part(
     watched.step(twist)
     watched.reset(seed=SEED)
     watched.step(zeros(watched))
-    np.testing.assert_allclose(asked[0].goals, watched.seen.goals @ pose.exp(twist), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(asked[1].goals, watched.seen.goals)
+    np.testing.assert_allclose(asked[0].goals, watched.seen.poses @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].goals, watched.seen.poses)
 
 
 def _nothing() -> Any:
@@ -167,14 +171,14 @@ def test_correction_aims_and_an_action_composes_on_top(watched: APOReplay, monke
     corrected = apo_bench.Corrected(watched, "apo_bench.correction.baselines.paper:paper")
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "converged"
-    assert not np.array_equal(seen["goals"], pose.pack(watched.seen.goals))
+    assert not np.array_equal(seen["poses"], pose.pack(watched.seen.poses))
     twist = np.full((3, 6), 0.01)
     after, *_ = corrected.step(twist)
-    np.testing.assert_allclose(asked[0].goals, pose.unpack(seen["goals"]) @ pose.exp(twist), rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(after["goals"], seen["goals"])
+    np.testing.assert_allclose(asked[0].goals, pose.unpack(seen["poses"]) @ pose.exp(twist), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(after["poses"], seen["poses"])
     watched.reset(seed=SEED)
     watched.step(zeros(watched))
-    np.testing.assert_array_equal(asked[1].goals, watched.seen.goals)
+    np.testing.assert_array_equal(asked[1].goals, watched.seen.poses)
 
 
 def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,19 +197,19 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(episode, "simulate_demonstration", demonstrated)
     corrected = apo_bench.Corrected(made, Asks())
     corrected.reset(seed=SEED)
-    assert again[0].seen.tolist() == [False, bool(again[0].seen[1])]
-    assert not np.array_equal(again[0].goals[1], made.seen.goals[1])
+    assert again[0].observed.tolist() == [False, bool(again[0].observed[1])]
+    assert not np.array_equal(again[0].poses[1], made.seen.poses[1])
     assert (made.look.left, made.look.reobservations) == (1, 1)
     copied = copy.deepcopy(made)
     second = made.look([0, 1])
-    np.testing.assert_array_equal(copied.look([0]).goals, second.goals)
+    np.testing.assert_array_equal(copied.look([0]).poses, second.poses)
     with pytest.raises(InputError, match="none is left"):
         made.look([0])
     corrected.reset(seed=SEED)
-    np.testing.assert_array_equal(again[1].goals, again[0].goals)
+    np.testing.assert_array_equal(again[1].poses, again[0].poses)
     simulated = demonstrated(made._scene, 1.0, SEED, "noise")
     look = reobservations_of(simulated, make_noise("outliers", NoiseLevel(1.0, 1.0)), SEED, 1)
-    np.testing.assert_array_equal(look([1]).goals, again[0].goals)
+    np.testing.assert_array_equal(look([1]).poses, again[0].poses)
 
 
 def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,7 +217,7 @@ def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch
     corrected = apo_bench.Corrected(watched, gives_up)
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "inconsistent"
-    np.testing.assert_array_equal(seen["goals"], pose.pack(watched.seen.goals))
+    np.testing.assert_array_equal(seen["poses"], pose.pack(watched.seen.poses))
     _, reward, terminated, _, info = corrected.step(zeros(watched))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "correct", "inconsistent")
     assert "failure_prediction" not in info
@@ -223,9 +227,9 @@ def rebuilds(seen: Observation) -> Correction:
     """Example 5.1: castle 2 is put down as it was seen, taken off, and put down rightly."""
     made = correct(seen, "paper")
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    targets = made.goals[[step.operation for step in schedule]]
-    targets[1:3] = seen.goals[1]
-    return replace(made, schedule=schedule, targets=targets)
+    targets = made.poses[[step.operation for step in schedule]]
+    targets[1:3] = seen.poses[1]
+    return replace(made, schedule=schedule, step_poses=targets)
 
 
 def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
@@ -241,10 +245,10 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     corrected.reset(seed=SEED)
     corrected.step(zeros(watched))
     assert asked[0].schedule == asked[1].schedule == made.schedule
-    moved = made.targets @ pose.exp(twist)[[0, 1, 1, 1, 2]]
+    moved = made.step_poses @ pose.exp(twist)[[0, 1, 1, 1, 2]]
     np.testing.assert_allclose(asked[0].targets, moved, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(asked[0].goals, made.goals @ pose.exp(twist), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(asked[1].targets, made.targets)
+    np.testing.assert_allclose(asked[0].goals, made.poses @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].targets, made.step_poses)
 
 
 def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
@@ -279,14 +283,14 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     assert info["code"] in outcomes.CODES
     assert all(isinstance(value, (bool, str, int, type(None))) for value in info.values())
     assert {f.name for f in fields(watched.seen)} == {
-        *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m", "outliers", "shared", "tails")
+        *("assembly", "start", "poses", "covariance", "observed", "gap_m", "play_m", "outliers", "shared", "tails")
     }
 
 
 def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     watched.reset(seed=SEED)
     again = (Step(0), Step(0, undo=True)) * 600
-    watched.aim(watched.seen.goals, (*again, *(Step(k) for k in range(3))))
+    watched.aim(watched.seen.poses, (*again, *(Step(k) for k in range(3))))
     monkeypatch.setattr(replays, "moves", _nothing)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
@@ -326,11 +330,11 @@ def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.Monk
 
     def blind(assembly: Any, shown: Any, rng: Any) -> Observation:
         full = Isotropic(NoiseLevel(1.0, 1.0))(assembly, shown, rng)
-        return Observation(assembly, full.start, full.goals, full.covariance, np.array([True, False]))
+        return Observation(assembly, full.start, full.poses, full.covariance, np.array([True, False]))
 
     env = APOReplay("block_on_block", noise=blind)
     seen, _ = env.reset(seed=SEED)
-    assert seen["seen"].tolist() == [1, 0]
+    assert seen["observed"].tolist() == [1, 0]
     _, reward, _, _, info = env.step(zeros(env))
     assert (reward, info["stage"], info["code"], info["operation"]) == (0.0, "observe", "not_seen", 2)
     for corrector, ended in (("contact", ("correct", "not_seen")), ("contact-robust", ("done", "ok"))):
@@ -386,10 +390,10 @@ def test_poses_may_be_measured_in_depth_images() -> None:
     shown, _ = APOReplay("block_on_block", noise_level=0.0).reset(seed=SEED)
     for key, x in first.items():
         np.testing.assert_array_equal(x, again[key])
-    assert first["seen"].all()
-    off = np.linalg.norm(first["goals"][:, :3] - shown["goals"][:, :3], axis=1)
+    assert first["observed"].all()
+    off = np.linalg.norm(first["poses"][:, :3] - shown["poses"][:, :3], axis=1)
     assert (off < 2e-3).all()
-    assert not np.array_equal(first["goals"], drawn["goals"])
+    assert not np.array_equal(first["poses"], drawn["poses"])
 
 
 @pytest.mark.parametrize(
@@ -427,7 +431,7 @@ def test_make_takes_every_argument_and_a_copy_travels() -> None:
     assert np.sqrt(seen["covariance"][0, 0, 0]) == pytest.approx(0.5e-3)
     assert np.sqrt(seen["covariance"][0, 5, 5]) == pytest.approx(np.radians(0.25))
     again = gymnasium.make(pickle.loads(pickle.dumps(made.spec)))
-    np.testing.assert_array_equal(again.reset(seed=1)[0]["goals"], seen["goals"])
+    np.testing.assert_array_equal(again.reset(seed=1)[0]["poses"], seen["poses"])
 
 
 def test_a_picture_without_a_display(small: APOReplay) -> None:
@@ -467,7 +471,7 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
 def test_what_evaluation_tools_pass_is_no_option(small: APOReplay) -> None:
     first, _ = small.reset(seed=SEED, options={"lerobot_new_rollout": True, "noise_level": 2.0})
     again, _ = small.reset(seed=SEED, options={"noise_level": 2.0})
-    np.testing.assert_array_equal(first["goals"], again["goals"])
+    np.testing.assert_array_equal(first["poses"], again["poses"])
 
 
 def test_wrappers_of_gymnasium_make_it_flat_and_float32() -> None:

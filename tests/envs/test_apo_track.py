@@ -47,14 +47,14 @@ def test_an_operation_is_shown_when_the_one_before_is_done(env: APOTrack) -> Non
     first, info = env.reset(seed=1)
     assert (first["shown"].tolist(), first["done"].tolist()) == ([1, 0, 0], [0, 0, 0])
     assert info["action_mask"].tolist() == [1, 0, 1]
-    np.testing.assert_array_equal(first["goals"][1:], [[0, 0, 0, 1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(first["poses"][1:], [[0, 0, 0, 1, 0, 0, 0]] * 2)
     assert not first["covariance"][1:].any()
-    assert not first["seen"][1:].any()
-    assert len(env.tracked.seen.goals) == 1
+    assert not first["observed"][1:].any()
+    assert len(env.tracked.seen.poses) == 1
     second, reward, *over, info = act(env, DO)
     assert (second["shown"].tolist(), second["done"].tolist()) == ([1, 1, 0], [1, 0, 0])
     assert (reward, over, info["action_mask"].tolist()) == (0.0, [False, False], [1, 1, 1])
-    np.testing.assert_array_equal(second["placed"], second["goals"])
+    np.testing.assert_array_equal(second["placed"], second["poses"])
     back, *_ = act(env, UNDO)
     assert (back["shown"].tolist(), back["done"].tolist()) == ([1, 1, 0], [0, 0, 0])
     assert env.schedule == (Step(0), Step(0, undo=True))
@@ -66,7 +66,7 @@ def test_a_twist_moves_what_is_done_from_where_it_was_seen(env: APOTrack) -> Non
     twist = np.array([1e-3, 0, 0, 0, 0, 0.01])
     for _ in range(2):
         after, *_ = env.step({"act": DO, "twist": twist})
-        np.testing.assert_allclose(pose.unpack(after["placed"][0]), pose.unpack(seen["goals"][0]) @ pose.exp(twist))
+        np.testing.assert_allclose(pose.unpack(after["placed"][0]), pose.unpack(seen["poses"][0]) @ pose.exp(twist))
         env.step({"act": UNDO, "twist": twist})
 
 
@@ -107,8 +107,8 @@ def test_the_corrector_of_the_paper_is_a_policy(name: str) -> None:
         reward, info = follow(env, paper_track_policy)
         assert (reward, info["code"], asked.status) == (1.0, "ok", "converged")
         assert env.schedule == asked.schedule
-        np.testing.assert_allclose(env.placed, asked.goals, rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(np.array(env._targets), asked.targets, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(env.placed, asked.poses, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(np.array(env._targets), asked.step_poses, rtol=0.0, atol=1e-9)
 
 
 def test_without_correction_contacts_are_open(env: APOTrack) -> None:
@@ -130,7 +130,7 @@ def test_the_corrector_contact_is_a_policy_too(env: APOTrack) -> None:
 def test_policies_give_up_where_correctors_do(policy: Any) -> None:
     def misses(assembly: Any, shown: Any, rng: np.random.Generator) -> Any:
         seen = observe(shown, "isotropic", rng)
-        return replace(seen, seen=np.array([True, False]))
+        return replace(seen, observed=np.array([True, False]))
 
     env = APOTrack("dovetail", replay=False, noise=misses)
     env.reset(seed=1)
@@ -159,7 +159,7 @@ def test_nothing_is_known_of_what_was_not_seen_yet(noise: str) -> None:
     shown = scenes.shown(scenes.stick_in_tower())
     whole = observe(shown, noise, np.random.default_rng(1))
     part = first_seen(whole, 2)
-    assert len(part.assembly) == len(part.goals) == len(part.covariance) == len(part.seen) == 2
+    assert len(part.assembly) == len(part.poses) == len(part.covariance) == len(part.observed) == 2
     assert {k for error in part.shared for k in error.operations} <= {0, 1}
-    assert correct(part, "contact").goals.shape == (2, 4, 4)
-    assert correct(first_seen(whole, 3), "contact").goals.tobytes() == correct(whole, "contact").goals.tobytes()
+    assert correct(part, "contact").poses.shape == (2, 4, 4)
+    assert correct(first_seen(whole, 3), "contact").poses.tobytes() == correct(whole, "contact").poses.tobytes()

@@ -70,12 +70,12 @@ def test_a_copy_goes_on_as_the_original_would(way: str, noise_level: float) -> N
 
 
 def test_a_copy_is_one_of_its_own(env: APOReplay) -> None:
-    kept = env.seen.goals.copy()
+    kept = env.seen.poses.copy()
     other = copy.deepcopy(env)
     other.reset(seed=SEED + 1, options={"noise_level": 3.0, "clearance_mm": 0.5})
     assert (env.trial, other.trial) == (SEED, SEED + 1)
     assert env._scene.clearance_mm != other._scene.clearance_mm
-    np.testing.assert_array_equal(env.seen.goals, kept)
+    np.testing.assert_array_equal(env.seen.poses, kept)
 
 
 def test_what_is_frozen_is_frozen_in_the_copy(env: APOReplay) -> None:
@@ -83,7 +83,7 @@ def test_what_is_frozen_is_frozen_in_the_copy(env: APOReplay) -> None:
     seen: Observation = copied.seen
     assert seen.assembly is copied.assembly
     face = next(iter(copied.assembly.solids["stick"].faces.values()))
-    for array in (seen.goals, seen.covariance, seen.seen, *seen.start.values(), face.outline, face.normal):
+    for array in (seen.poses, seen.covariance, seen.observed, *seen.start.values(), face.outline, face.normal):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
     for mapping in (seen.start, copied.assembly.solids, copied._scene.scenario.colors):
@@ -95,7 +95,7 @@ def test_a_correction_can_be_pickled() -> None:
     made = Correction(np.tile(np.eye(4), (2, 1, 1)), "converged", "", (1,), 0.1, 0.0, 3)
     again = pickle.loads(pickle.dumps(made))
     assert (again.status, again.freed, again.covariance) == ("converged", (1,), None)
-    np.testing.assert_array_equal(again.goals, made.goals)
+    np.testing.assert_array_equal(again.poses, made.poses)
 
 
 @pytest.mark.parametrize("name", ["camera", "swaps", "megapose-lmo"])
@@ -106,7 +106,7 @@ def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
         model(env.assembly, env._episode.simulated.demonstration, np.random.default_rng(1))
         for model in (noise, pickle.loads(pickle.dumps(noise)))
     )
-    np.testing.assert_array_equal(here.goals, there.goals)
+    np.testing.assert_array_equal(here.poses, there.poses)
 
 
 def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> None:
@@ -197,7 +197,7 @@ def test_environments_work_in_spawned_processes() -> None:
         assert "trial" not in infos
         for i in range(2):
             mine, _ = env.reset(seed=SEED + i, options={"noise_level": 2.0})
-            np.testing.assert_array_equal(seen["goals"][i], mine["goals"])
+            np.testing.assert_array_equal(seen["poses"][i], mine["poses"])
         assert many.get_attr("trial") == (SEED, SEED + 1)
     finally:
         many.close()

@@ -29,11 +29,11 @@ def written(folder: Path, *lines: str) -> Path:
 def test_millimetres_and_wxyz(tmp_path: Path) -> None:
     seen, assumed = read_table(written(tmp_path, *ROWS), SCENARIO, deviation_mm=2.0, deviation_deg=0.5)
     expected = [pose.at((0.120, 0.020, 0)), pose.at((0.121, 0.020, 0.080), (180, 0, 0)), pose.at((0.119, 0.0205, 0.04))]
-    assert seen.goals == pytest.approx(np.array(expected), abs=1e-15)
+    assert seen.poses == pytest.approx(np.array(expected), abs=1e-15)
     assert np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2)) == pytest.approx(
         np.tile([2e-3] * 3 + [np.radians(0.5)] * 3, (3, 1))
     )
-    assert (assumed, bool(seen.seen.all()), seen.gap_m, seen.play_m) == (True, True, 1e-4, 2.5e-4)
+    assert (assumed, bool(seen.observed.all()), seen.gap_m, seen.play_m) == (True, True, 1e-4, 2.5e-4)
 
 
 def test_columns_are_known_by_their_names(tmp_path: Path) -> None:
@@ -46,8 +46,8 @@ def test_columns_are_known_by_their_names(tmp_path: Path) -> None:
         b"castle2,2,1,0,0,0,0.08,0.02,0.121,false\r\n"
     )
     seen, _ = read_table(other, SCENARIO)
-    assert seen.goals == pytest.approx(read_table(written(tmp_path, *ROWS), SCENARIO)[0].goals, abs=1e-15)
-    assert seen.seen.tolist() == [True, False, True]
+    assert seen.poses == pytest.approx(read_table(written(tmp_path, *ROWS), SCENARIO)[0].poses, abs=1e-15)
+    assert seen.observed.tolist() == [True, False, True]
 
 
 def test_deviations_are_read_where_they_are_stated(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_a_table_comes_back_as_it_was_written(tmp_path: Path) -> None:
     goals = SCENARIO.goals @ pose.exp(0.1 * rng.standard_normal((3, 6)))
     path = tmp_path / "back.csv"
     path.write_text(table(SCENARIO.assembly, goals), encoding="utf-8")
-    assert read_table(path, SCENARIO)[0].goals == pytest.approx(goals, abs=1e-15)
+    assert read_table(path, SCENARIO)[0].poses == pytest.approx(goals, abs=1e-15)
 
 
 def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
     path = tmp_path / "seen.json"
     files.write_form(files.observation_form(seen, "stick_in_tower"), path)
     again = apo_bench.read_observation(path, SCENARIO)
-    assert again.goals == pytest.approx(seen.goals, abs=1e-15)
+    assert again.poses == pytest.approx(seen.poses, abs=1e-15)
     assert again.covariance == pytest.approx(seen.covariance, rel=1e-12, abs=1e-20)
     assert (again.gap_m, again.play_m) == pytest.approx((seen.gap_m, seen.play_m))
     assert all(again.start[part] == pytest.approx(T, abs=1e-15) for part, T in seen.start.items())
@@ -148,7 +148,7 @@ def test_the_limits_themselves_are_allowed(tmp_path: Path, mm: float, deg: float
         apo_bench.read_observation(written(tmp_path, *ROWS), SCENARIO, deviation_mm=mm, deviation_deg=deg),
     ):
         made = apo_bench.correct(seen)
-        assert (made.ok, made.rank, apo_bench.explain(seen, made.goals).rank) == (True, 13, 13)
+        assert (made.ok, made.rank, apo_bench.explain(seen, made.poses).rank) == (True, 13, 13)
 
 
 def test_a_path_is_needed() -> None:
@@ -160,11 +160,11 @@ def test_only_files_that_state_their_noise_are_read_without_assuming(tmp_path: P
     with pytest.raises(InputError, match="standard deviations are missing; add columns deviation_mm and deviation_deg"):
         read_stated(written(tmp_path, *ROWS), SCENARIO)
     full = [f"{HEADER},deviation_mm,deviation_deg", *(f"{row},2,1" for row in ROWS[1:])]
-    assert read_stated(written(tmp_path, *full), SCENARIO).goals.shape == (3, 4, 4)
+    assert read_stated(written(tmp_path, *full), SCENARIO).poses.shape == (3, 4, 4)
 
 
 def test_three_lines_correct_a_table(tmp_path: Path) -> None:
     seen = apo_bench.read_observation(written(tmp_path, *ROWS), "stick_in_tower")
     made = apo_bench.correct(seen)
-    found = apo_bench.explain(seen, made.goals)
+    found = apo_bench.explain(seen, made.poses)
     assert (made.ok, made.gap_after_m < 1e-12, found.rank, found.freedom) == (True, True, 13, 5)

@@ -32,9 +32,9 @@ def observation(seed: int = 0) -> Observation:
     return Observation(
         assembly=SCENARIO.assembly,
         start=SCENARIO.start,
-        goals=SCENARIO.goals @ pose.exp(rng.normal(size=(N, 6)) * np.repeat([0.1, 1.0], 3)),
+        poses=SCENARIO.goals @ pose.exp(rng.normal(size=(N, 6)) * np.repeat([0.1, 1.0], 3)),
         covariance=A @ np.swapaxes(A, 1, 2) + 1e-8 * np.eye(6),
-        seen=rng.random(N) < 0.7,
+        observed=rng.random(N) < 0.7,
         gap_m=float(rng.uniform(1e-5, 1e-3)),
         play_m=float(rng.uniform(0.0, 1e-3)),
     )
@@ -51,7 +51,7 @@ def with_shared(seen: Observation) -> Observation:
     camera = SharedError("camera", (0, 2), C, P)
     drift = SharedError("drift", (1, 2), C, P, local=True, correlation=first_order(2, 0.9))
     four = np.array([1e-3, 4e-3, 0.02, 0.03])
-    tails = Tails(seen.goals[:, :3, :3], four, np.array([2.0, 3.0, 1e9, 5.0]), 2.0 * four**2, np.array([0.05, 0.5]))
+    tails = Tails(seen.poses[:, :3, :3], four, np.array([2.0, 3.0, 1e9, 5.0]), 2.0 * four**2, np.array([0.05, 0.5]))
     return replace(seen, shared=(camera, drift, SharedError("castle1", (0,), C)), tails=tails)
 
 
@@ -78,9 +78,9 @@ def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None
 def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
     seen = observation(seed)
     back = read(tmp_path, files.observation_form(seen, "stick_in_tower"))
-    np.testing.assert_allclose(back.goals, seen.goals, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.poses, seen.poses, rtol=0, atol=1e-13)
     np.testing.assert_allclose(back.covariance, seen.covariance, rtol=1e-12, atol=0)
-    assert back.seen.tolist() == seen.seen.tolist()
+    assert back.observed.tolist() == seen.observed.tolist()
     assert back.gap_m == pytest.approx(seen.gap_m, rel=1e-12)
     assert back.play_m == pytest.approx(seen.play_m, rel=1e-12)
     assert set(back.start) == set(seen.start)
@@ -92,24 +92,24 @@ def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
 @given(seed=st.integers(0, 2**32))
 def test_a_plan_comes_back_with_its_targets(seed: int, tmp_path: Path) -> None:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    targets = observation(seed).goals[[0, 1, 1, 2, 2]]
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(seed).goals[[0, 2, 2]], schedule, targets)
+    targets = observation(seed).poses[[0, 1, 1, 2, 2]]
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(seed).poses[[0, 2, 2]], schedule, targets)
     form = files.plan_form(plan, "stick_in_tower")
     assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
     files.write_form(form, tmp_path / "plan.json")
     back = json_reading.read_plan(tmp_path / "plan.json", SCENARIO)
     assert back.schedule == schedule
-    np.testing.assert_allclose(back.targets, targets, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.step_poses, targets, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.target_poses, plan.target_poses, rtol=0, atol=1e-13)
 
 
 def test_a_plan_without_a_schedule_does_everything_once(tmp_path: Path) -> None:
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).poses)
     form = files.plan_form(plan, "stick_in_tower") | {"schedule": []}
     files.write_form(form, tmp_path / "plan.json")
     back = json_reading.read_plan(tmp_path / "plan.json")
     assert back.schedule == plan.schedule == (Step(0), Step(1), Step(2))
-    np.testing.assert_array_equal(back.targets, back.goals)
+    np.testing.assert_array_equal(back.step_poses, back.target_poses)
 
 
 HALF = {"operation": 1, "position_mm": [0.0, 0.0, 0.0]}
@@ -129,7 +129,7 @@ WRONG = HALF | {"quaternion_wxyz": [2, 0, 0, 0]}
     ],
 )
 def test_a_schedule_that_makes_no_sense_is_refused(schedule: Any, words: str, tmp_path: Path) -> None:
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).poses)
     files.write_form(files.plan_form(plan, "stick_in_tower") | {"schedule": schedule}, tmp_path / "plan.json")
     with pytest.raises(InputError) as refused:
         json_reading.read_plan(tmp_path / "plan.json")
@@ -156,7 +156,7 @@ def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
         entry |= {"deviation_mm": 2.0, "deviation_deg": 0.5}
     back = read(tmp_path, document)
     assert np.diag(back.covariance[0]) == pytest.approx([4e-6] * 3 + [np.radians(0.5) ** 2] * 3)
-    assert back.seen.all()
+    assert back.observed.all()
     assert back.gap_m == SCENARIO.gap_mm * 1e-3
     np.testing.assert_array_equal(back.start["castle1"], SCENARIO.start["castle1"])
     lowered = SCENARIO.start["stick"][2, 3] - back.start["stick"][2, 3]
@@ -312,5 +312,5 @@ def test_any_value_anywhere_is_read_or_refused(value: Any, data: st.DataObject, 
             raise
     else:
         event("read")
-        assert np.isfinite(back.goals).all()
+        assert np.isfinite(back.poses).all()
         assert (np.linalg.eigvalsh(back.covariance) > 0).all()

@@ -39,7 +39,7 @@ def csv(tmp_path: Path, column: str, *cells: str) -> Path:
 def test_play_in_a_table(column: str, cells: tuple[str, ...], play_mm: float, tmp_path: Path) -> None:
     seen, _ = read_table(csv(tmp_path, column, *cells), SCENARIO)
     assert seen.play_m == pytest.approx(1e-3 * play_mm)
-    np.testing.assert_allclose(seen.goals, SCENARIO.goals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(seen.poses, SCENARIO.goals, rtol=0, atol=1e-15)
 
 
 def test_play_in_json_and_without(tmp_path: Path) -> None:

@@ -136,19 +136,19 @@ def test_noise_turns_a_part_of_revolution_about_its_axis_as_it_states():
     stated = []
     for seed in range(200):
         seen = Symmetric(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(seen.goals) @ demonstration.goals)
+        xi = pose.log(pose.inverse(seen.poses) @ demonstration.poses)
         turned.append(xi[1, 3:])
         stated.append(np.diag(seen.covariance[1])[3:])
     assert np.degrees(np.std(turned, axis=0)) == pytest.approx([1.0, 1.0, 3.0], rel=0.15)
     assert np.sqrt(np.mean(stated, axis=0)) == pytest.approx(np.std(turned, axis=0), rel=0.15)
     any_turn = AnyTurn(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(0))
-    off = pose.inverse(any_turn.goals[1]) @ demonstration.goals[1]
+    off = pose.inverse(any_turn.poses[1]) @ demonstration.poses[1]
     assert abs(np.arctan2(off[1, 0], off[0, 0])) > 0.1
 
 
 def test_a_free_turn_of_a_part_of_revolution_is_no_error():
     assembly, demonstration = pinned()
-    truth = demonstration.goals
+    truth = demonstration.poses
     found = revolution(assembly.solids["pin"])
     goals = np.array(truth)
     goals[1] = goals[1] @ turn_about(found.point, found.axis, 2.5)

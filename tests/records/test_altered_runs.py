@@ -63,7 +63,11 @@ def test_altered_folders_are_read_or_refused_in_one_sentence(tmp_path: Path, mon
     [
         ("trials.jsonl", '{"success": 1}', "line 1, field success: true or false or null is needed, a whole number"),
         ("trials.jsonl", '{"seed": -1}', "line 1, field seed: a whole number >= 0 is needed"),
-        ("trials.jsonl", '{"noise_mm": null}', "line 1, field level: level and level_deg and careless are null together"),
+        (
+            "trials.jsonl",
+            '{"noise_mm": null}',
+            "line 1, field level: level and level_deg and careless are null together",
+        ),
         ("trials.jsonl", '{"failure_stage": "nowhere"}', "line 1, field failure_stage: 'nowhere' is none of"),
         ("trials.jsonl", '{"method": "a\\u001bb"}', "line 1, field method: text without control characters is needed"),
         (

@@ -67,14 +67,14 @@ def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
     noise = make_noise("isotropic", NoiseLevel(1.0, 1.0))
     plain = simulate_demonstration(tower, 1.0, 3)
     salted = simulate_demonstration(tower, 1.0, 3, secret_seed=HERE)
-    assert not np.array_equal(plain.layout.goals, salted.layout.goals)
-    off = [shown.demonstration.goals[1] - shown.layout.goals[1] for shown in (plain, salted)]
+    assert not np.array_equal(plain.layout.poses, salted.layout.poses)
+    off = [shown.demonstration.poses[1] - shown.layout.poses[1] for shown in (plain, salted)]
     assert not np.allclose(*off, rtol=0, atol=1e-5)
     seen = [observe_demonstration(plain, noise, 3, secret_seed) for secret_seed in (None, HERE, THERE, HERE)]
-    assert not any(np.array_equal(seen[0].goals, other.goals) for other in seen[1:])
-    np.testing.assert_array_equal(seen[1].goals, seen[3].goals)
+    assert not any(np.array_equal(seen[0].poses, other.poses) for other in seen[1:])
+    np.testing.assert_array_equal(seen[1].poses, seen[3].poses)
     expected = noise(tower.scenario.assembly, plain.demonstration, stream(3, OBSERVATION, HERE))
-    np.testing.assert_array_equal(seen[1].goals, expected.goals)
+    np.testing.assert_array_equal(seen[1].poses, expected.poses)
 
 
 def test_nothing_that_is_printed_or_written_shows_the_salt() -> None:

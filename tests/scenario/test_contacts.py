@@ -145,7 +145,7 @@ def test_correctors_that_know_no_walls_are_not_moved_by_them(tmp_path: Path) -> 
     goals[2, 1, 3] += 1e-3
     a = correct(seen(walls, goals), "paper")
     b = correct(seen(plain, goals), "paper")
-    np.testing.assert_array_equal(a.goals, b.goals)
+    np.testing.assert_array_equal(a.poses, b.poses)
 
 
 def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> None:
@@ -164,5 +164,5 @@ def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> Non
     goals[2, 1, 3] += 1e-3
     made = correct(seen(scenario, goals), "contact")
     assert made.ok, made.sentence
-    aside = made.goals[2, 1, 3] - made.goals[:2, 1, 3]
+    aside = made.poses[2, 1, 3] - made.poses[:2, 1, 3]
     np.testing.assert_allclose(aside, 0.25e-3, atol=1e-9)

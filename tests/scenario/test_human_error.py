@@ -63,7 +63,7 @@ def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, 
     truth = layout(scenario, seed)
     allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
     offsets = spread_error(scenario, truth, np.array([x, y, 0.0])).offsets
-    shown = truth.goals @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
+    shown = truth.poses @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
     poses = placements(scenario.assembly, truth.start, shown)[2]
     face, on = (scenario.assembly.face(of) for of in scenario.assembly.operations[2].contacts[1])
     corner = pose.apply(pose.inverse(poses["cube"]) @ poses["castle2"], face.outline[:1])[0]

@@ -84,7 +84,7 @@ def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
     nominal = placements(assembly, scenario.start, scenario.goals)
     for seed in GENERATOR_SEEDS:
         layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
-        stages = placements(assembly, layout.start, layout.goals)
+        stages = placements(assembly, layout.start, layout.poses)
         for k, operation in enumerate(assembly.operations):
             for contact in operation.contacts:
                 assert gap_m(assembly, contact, stages[k]) < 1e-9
@@ -102,13 +102,13 @@ def test_draws_fill_their_ranges_and_stay_inside(name: str):
     scenario = SCENARIOS[name]
     site = scenario.site
     layouts = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in GENERATOR_SEEDS]
-    first = np.array([layout.goals[0] @ pose.inverse(scenario.goals[0]) for layout in layouts])
+    first = np.array([layout.poses[0] @ pose.inverse(scenario.goals[0]) for layout in layouts])
     yaw = np.arctan2(first[:, 1, 0], first[:, 0, 0])
     drawn = [first[:, 0, 3] - site.center_m[0], first[:, 1, 3] - site.center_m[1], yaw - np.mean(site.yaw_rad)]
     half = [*site.spread_m, np.ptp(site.yaw_rad) / 2]
     for shift in scenario.shifts:
         moved = [pose.inverse(T @ scenario.goals[shift.operation]) for T in first]
-        along = [(m @ layout.goals[shift.operation])[:3, 3] for m, layout in zip(moved, layouts, strict=True)]
+        along = [(m @ layout.poses[shift.operation])[:3, 3] for m, layout in zip(moved, layouts, strict=True)]
         drawn.append(np.array(along) @ shift.axis - (shift.low_m + shift.high_m) / 2)
         half.append((shift.high_m - shift.low_m) / 2)
     for values, width in zip(drawn, half, strict=True):
@@ -122,8 +122,8 @@ def test_draws_fill_their_ranges_and_stay_inside(name: str):
 def test_the_same_seed_draws_the_same_bytes(name: str):
     scenario = SCENARIOS[name]
     one, two, other = (draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in (7, 7, 8))
-    assert one.goals.tobytes() == two.goals.tobytes()
-    assert one.goals.tobytes() != other.goals.tobytes()
+    assert one.poses.tobytes() == two.poses.tobytes()
+    assert one.poses.tobytes() != other.poses.tobytes()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -142,7 +142,7 @@ def test_starts_are_those_of_the_file(name: str):
 def test_only_fixed_parts_that_follow_the_site_start_elsewhere():
     scenario = replace(SCENARIOS["stick_in_tower"], follows_site=frozenset({"table"}))
     layout = draw_layout(scenario, np.random.default_rng([3, 0]), clearance_mm=0.0)
-    assert np.allclose(layout.start["table"] @ scenario.goals[0], layout.goals[0], atol=1e-15)
+    assert np.allclose(layout.start["table"] @ scenario.goals[0], layout.poses[0], atol=1e-15)
     assert (layout.start["stick"] == scenario.start["stick"]).all()
 
 
@@ -177,11 +177,11 @@ def test_no_start_is_in_the_way_of_the_assembly(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
     for layout in extremes(scenario):
-        stages = (layout.start, *placements(assembly, layout.start, layout.goals))
+        stages = (layout.start, *placements(assembly, layout.start, layout.poses))
         waiting = set(assembly.solids) - assembly.fixed
         for k, operation in enumerate(assembly.operations):
             waiting -= set(operation.moves)
-            T = layout.goals[k]
+            T = layout.poses[k]
             attach = scenario.attach[k]
             back = T @ pose.at(-attach.travel_m * attach.direction) @ pose.inverse(T)
             fingers = open_fingers(scenario.grasps[k], T)
@@ -201,7 +201,7 @@ def test_the_fingers_find_room_where_a_part_waits(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
     for layout in extremes(scenario):
-        stages = (layout.start, *placements(assembly, layout.start, layout.goals))
+        stages = (layout.start, *placements(assembly, layout.start, layout.poses))
         moved: set[str] = set()
         for k, operation in enumerate(assembly.operations):
             if operation.main not in moved:
@@ -219,7 +219,7 @@ def test_everything_is_within_reach(name: str):
         T @ pose.at(grasp.point)
         for layout in extremes(scenario)
         for goal, operation, grasp, attach in zip(
-            layout.goals, operations, scenario.grasps, scenario.attach, strict=True
+            layout.poses, operations, scenario.grasps, scenario.attach, strict=True
         )
         for T in (goal, goal @ pose.at(-attach.travel_m * attach.direction), scenario.start[operation.main])
     ]
@@ -237,15 +237,15 @@ def test_a_turn_is_one_about_its_point_and_leaves_what_shifts_draw(point: tuple[
     for angle in (-0.2, 0.4):
         layout = layout_at(turned, 0.1, 0.0, 0.3, turns_rad=[angle])
         before = layout_at(plain, 0.1, 0.0, 0.3)
-        moved = pose.inverse(before.goals[0]) @ layout.goals[0]
+        moved = pose.inverse(before.poses[0]) @ layout.poses[0]
         np.testing.assert_allclose(pose.apply(moved, np.array([point])), [point], rtol=0, atol=1e-12)
         assert np.arctan2(moved[1, 0], moved[0, 0]) == pytest.approx(angle)
-        assert (layout.goals[1:] == before.goals[1:]).all()
+        assert (layout.poses[1:] == before.poses[1:]).all()
     found = []
     drawn = [draw_layout(s, np.random.default_rng([7, 0])) for s in (plain, turned)]
-    assert (drawn[0].goals[1:] == drawn[1].goals[1:]).all()
+    assert (drawn[0].poses[1:] == drawn[1].poses[1:]).all()
     for seed in GENERATOR_SEEDS:
-        each = [draw_layout(s, np.random.default_rng([seed, 0])).goals[0] for s in (plain, turned)]
+        each = [draw_layout(s, np.random.default_rng([seed, 0])).poses[0] for s in (plain, turned)]
         found.append(np.arctan2(*(pose.inverse(each[0]) @ each[1])[[1, 0], [0, 0]]))
     assert -0.2 <= min(found) < -0.17
     assert 0.37 < max(found) <= 0.4
@@ -261,9 +261,9 @@ def test_what_is_bolted_to_the_table_follows_the_site_and_turned_parts_still_tou
     bolted = next(iter(scenario.follows_site))
     for seed in range(20):
         layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
-        site = layout.goals[-1] @ pose.inverse(scenario.goals[-1])
+        site = layout.poses[-1] @ pose.inverse(scenario.goals[-1])
         np.testing.assert_allclose(layout.start[bolted], site @ scenario.start[bolted], rtol=0, atol=1e-12)
-        assert largest_gap(scenario.assembly, layout.start, layout.goals) < 1e-9
+        assert largest_gap(scenario.assembly, layout.start, layout.poses) < 1e-9
 
 
 def test_nominal_starts_are_seen_from_the_middle_of_where_the_site_may_be():

@@ -18,7 +18,7 @@ def test_they_are_those_drawn_one_after_the_other(name: str, clearance_mm: float
     rng = np.random.default_rng(5)
     for i in range(4):
         one = draw_layout(scenario, rng, clearance_mm)
-        np.testing.assert_allclose(many.goals[i], one.goals, rtol=0.0, atol=1e-14)
+        np.testing.assert_allclose(many.goals[i], one.poses, rtol=0.0, atol=1e-14)
         assert many.start.keys() == one.start.keys()
         for part, T in one.start.items():
             np.testing.assert_allclose(many.start[part][i], T, rtol=0.0, atol=1e-14)

@@ -28,11 +28,11 @@ def layout(scene: Scene, seed: int) -> Layout:
 def run(scene: Scene, seed: int, goals: Array, schedule: tuple[Step, ...] = ()) -> tuple[ReplayResult, Verdict]:
     truth = layout(scene, seed)
     result = replay(Plan(scene.scenario.assembly, truth.start, goals, schedule), scene)
-    return result, judge(scene.scenario.assembly, result.reached, truth.goals, scene.criteria)
+    return result, judge(scene.scenario.assembly, result.reached, truth.poses, scene.criteria)
 
 
 def test_the_true_layout_is_assembled(castles: Scene) -> None:
-    result, verdict = run(castles, 2, layout(castles, 2).goals)
+    result, verdict = run(castles, 2, layout(castles, 2).poses)
     assert result.outcome.code == "ok"
     assert verdict.success
     assert verdict.loose_success
@@ -45,23 +45,23 @@ def test_the_true_layout_is_assembled(castles: Scene) -> None:
 
 def test_an_operation_can_be_undone_and_done_again(tower: Scene) -> None:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    result, verdict = run(tower, 2, layout(tower, 2).goals, schedule)
+    result, verdict = run(tower, 2, layout(tower, 2).poses, schedule)
     assert result.outcome.code == "ok"
     assert verdict.success
 
 
 def test_an_inserted_stick_can_be_pulled_out(tower: Scene) -> None:
     schedule = (Step(0), Step(1), Step(2), Step(2, undo=True))
-    result, _ = run(tower, 2, layout(tower, 2).goals, schedule)
+    result, _ = run(tower, 2, layout(tower, 2).poses, schedule)
     assert result.outcome.code == "ok"
     start = layout(tower, 2).start
     end = result.reached.final.poses
     assert np.linalg.norm(end["stick"][:3, 3] - start["stick"][:3, 3]) < 0.005
-    assert np.linalg.norm(end["castle2"][:3, 3] - layout(tower, 2).goals[1][:3, 3]) < 0.001
+    assert np.linalg.norm(end["castle2"][:3, 3] - layout(tower, 2).poses[1][:3, 3]) < 0.001
 
 
 def test_a_goal_out_of_reach_is_an_outcome_of_the_plan(tower: Scene) -> None:
-    goals = np.array(layout(tower, 2).goals)
+    goals = np.array(layout(tower, 2).poses)
     goals[:, 0, 3] += 0.5
     result, verdict = run(tower, 2, goals)
     assert (result.outcome.stage, result.outcome.code) == ("plan", "unreachable")
@@ -72,13 +72,13 @@ def test_a_goal_out_of_reach_is_an_outcome_of_the_plan(tower: Scene) -> None:
 def test_a_start_out_of_reach_is_not_called_a_goal(tower: Scene) -> None:
     truth = layout(tower, 2)
     far = {**truth.start, "castle2": pose.at((0.5, 0, 0)) @ truth.start["castle2"]}
-    result = replay(Plan(tower.scenario.assembly, far, truth.goals), tower)
+    result = replay(Plan(tower.scenario.assembly, far, truth.poses), tower)
     assert (result.outcome.stage, result.outcome.code) == ("plan", "unreachable_start")
     assert result.outcome.sentence == "the arm cannot reach castle2 where operation 2 picks it up"
 
 
 def test_a_goal_beside_its_support_is_an_outcome_of_the_plan(tower: Scene) -> None:
-    goals = np.array(layout(tower, 2).goals)
+    goals = np.array(layout(tower, 2).poses)
     goals[1] = goals[1] @ pose.at((0.035, 0, 0))
     result, _ = run(tower, 2, goals)
     assert (result.outcome.stage, result.outcome.code) == ("plan", "unstable_goal")
@@ -88,7 +88,7 @@ def test_a_goal_beside_its_support_is_an_outcome_of_the_plan(tower: Scene) -> No
 def test_a_part_that_is_not_where_it_should_be_is_a_lost_grasp(tower: Scene) -> None:
     """The robot believes the start it is told; physics has the part elsewhere."""
     truth = layout(tower, 2)
-    plan = Plan(tower.scenario.assembly, truth.start, truth.goals)
+    plan = Plan(tower.scenario.assembly, truth.start, truth.poses)
     elsewhere = {**truth.start, "castle1": truth.start["castle1"] @ pose.at((-0.10, 0, 0))}
     result = replay(plan, tower, parts_at=elsewhere)
     assert (result.outcome.stage, result.outcome.code) == ("pick", "lost_grasp")

@@ -39,13 +39,13 @@ def shown(name: str, human_error_scale: float, seed: int) -> SimulatedDemonstrat
 
 def off_mm(of: SimulatedDemonstration) -> Array:
     """How far each shown goal is from the truth, (n, 3), world."""
-    return 1e3 * (of.demonstration.goals - of.layout.goals)[:, :3, 3]
+    return 1e3 * (of.demonstration.poses - of.layout.poses)[:, :3, 3]
 
 
 def end_mm(of: SimulatedDemonstration, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
     human = of.demonstration
-    true = placements(human.assembly, of.layout.start, of.layout.goals)[-1][part]
+    true = placements(human.assembly, of.layout.start, of.layout.poses)[-1][part]
     return 1e3 * (human.final[part] - true)[:3, 3]
 
 
@@ -57,7 +57,7 @@ def test_a_careful_human_shows_the_truth(name: str):
     assert of.demonstration.code == "ok"
     assert np.abs(off[:, :2]).max() < LEVEL_MM
     assert off[:, 2] == pytest.approx(-np.array(low), abs=1.5 * LEVEL_MM)
-    turns = pose.log(pose.inverse(of.layout.goals) @ of.demonstration.goals)[:, 3:]
+    turns = pose.log(pose.inverse(of.layout.poses) @ of.demonstration.poses)[:, 3:]
     assert np.degrees(np.abs(turns)).max() < 0.02
 
 
@@ -69,7 +69,7 @@ def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, hum
     assert of.demonstration.code == "ok"
     mistake = load_scenario(name).human_error
     k = of.demonstration.assembly.operations[mistake.operation].main
-    axis = of.layout.goals[mistake.operation][:2, :2] @ mistake.axis[:2]
+    axis = of.layout.poses[mistake.operation][:2, :2] @ mistake.axis[:2]
     erring = ALIKE.get(name, {mistake.operation})
     for operation, off in enumerate(off_mm(of)):
         if operation in erring:
@@ -101,7 +101,7 @@ def test_a_group_leaves_nothing_behind_for_the_next_trial():
     first = shown("pocket_table", 1.0, 2).demonstration
     simulate_demonstration(scene("pocket_table"), 0.0, 5)
     again = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
-    np.testing.assert_array_equal(first.goals, again.goals)
+    np.testing.assert_array_equal(first.poses, again.poses)
     for part, T in first.final.items():
         np.testing.assert_array_equal(T, again.final[part])
 
@@ -112,7 +112,7 @@ def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytes
     monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
     monkeypatch.setattr(demonstration, "sleeping", lambda world, allowed: nullcontext())
     whole = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
-    pairs = [*zip(whole.goals, quick.goals, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]
+    pairs = [*zip(whole.poses, quick.poses, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]
     off = np.array([pose.log(pose.inverse(a) @ b) for a, b in pairs])
     assert np.abs(off[:, :3]).max() < 5e-6
     assert np.degrees(np.abs(off[:, 3:]).max()) < 0.005

@@ -39,7 +39,9 @@ def shown(name="stick_in_tower", grasp="friction", seed=1, human_error_scale=1.0
 
 
 def row(method, fidelity, *, grasp="friction", noise_level=1.0, cache=None):
-    spec = TrialConfig("stick_in_tower", noise_level, noise_level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
+    spec = TrialConfig(
+        "stick_in_tower", noise_level, noise_level, grasp=grasp, method=method, seed=1, fidelity=fidelity
+    )
     return json.dumps(run_trial(spec, scene(grasp=grasp), simulated=shown(grasp=grasp), cache=cache))
 
 
@@ -59,7 +61,7 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
 
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     cache = ReplayCache()
-    plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals)
+    plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.poses)
     first = replay(plan, scene(), fidelity="near-contact", cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
     assert replay(plan, scene(), fidelity="near-contact", cache=cache) is first
@@ -67,8 +69,8 @@ def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
 
 def test_marks_differ_where_anything_that_led_there_differs():
     layout = shown().layout
-    plan = Plan(load_scenario("stick_in_tower").assembly, layout.start, layout.goals)
-    later = np.array(layout.goals)
+    plan = Plan(load_scenario("stick_in_tower").assembly, layout.start, layout.poses)
+    later = np.array(layout.poses)
     later[-1, :3, 3] += [0.0, 0.0, 1e-9]
     other = Plan(plan.assembly, plan.start, later)
     a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
@@ -122,14 +124,14 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
     monkeypatch.setattr(ForceSensors, "hold", holding)
     monkeypatch.setattr(robot, "TICK_S", 0.005)
     layout = shown("vanished_fixture").layout
-    done = replay(Plan(its.scenario.assembly, layout.start, layout.goals), its, feel)
+    done = replay(Plan(its.scenario.assembly, layout.start, layout.poses), its, feel)
     assert done.outcome.code == "ok"
     assert met == []
 
 
 def test_contact_simulates_less_and_passes_as_much_time():
     layout = shown().layout
-    plan = Plan(scene().scenario.assembly, layout.start, layout.goals)
+    plan = Plan(scene().scenario.assembly, layout.start, layout.poses)
     full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "contact"))
     assert full.outcome.code == contact.outcome.code == "ok"
     assert contact.sim_time_s == pytest.approx(full.sim_time_s, abs=0.5)

@@ -27,7 +27,7 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     assembly = scene.scenario.assembly
     track = FilmTrack()
     hands = FilmTrack()
-    plan = Plan(assembly, layout.start, layout.goals)
+    plan = Plan(assembly, layout.start, layout.poses)
     assert replay(plan, scene, track.hooks, fidelity="near-contact").outcome.code == "ok"
     assert track.plan is plan
     order = list(dict.fromkeys((m.doing.operation, m.doing.macro) for m in track.moments if m.doing.operation == 1))

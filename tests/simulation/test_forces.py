@@ -20,7 +20,7 @@ def test_a_blow_shows_its_impulse_whatever_the_step(step_s: float) -> None:
 
 def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
-    plan = Plan(tower.scenario.assembly, layout.start, layout.goals)
+    plan = Plan(tower.scenario.assembly, layout.start, layout.poses)
     single = [0.0]
     net = ForceSensors.net
 

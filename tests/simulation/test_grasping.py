@@ -39,7 +39,7 @@ def fixture() -> Scene:
 def nominal(scene: Scene, schedule: tuple[Step, ...] = ()) -> Plan:
     site = scene.scenario.site
     at = layout_at(scene.scenario, *site.center_m, sum(site.yaw_rad) / 2, clearance_mm=scene.clearance_mm)
-    return Plan(scene.scenario.assembly, at.start, at.goals, schedule)
+    return Plan(scene.scenario.assembly, at.start, at.poses, schedule)
 
 
 def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float, poses: Poses) -> float:
@@ -67,8 +67,8 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
     assert 0.01 < left < 0.05
     assert first.T_part_tip[0, 3] < -0.05
     assert abs(second.T_part_tip[0, 3]) < 0.025
-    poses = placements(plan.assembly, plan.start, plan.goals)[4]
-    goal = plan.goals[4]
+    poses = placements(plan.assembly, plan.start, plan.target_poses)[4]
+    goal = plan.target_poses[4]
     for back in np.linspace(move.transfer.into.travel, left, 60):
         at = goal @ pose.at((-back, 0, 0))
         assert depth(pockets, move, at, first.T_part_tip, first.half_width, poses) <= 0.0
@@ -104,7 +104,7 @@ def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_
 
 def fixture_side(scene: Scene) -> Array:
     """From castle 2 to the cube."""
-    return nominal(scene).goals[2][:3, 1]
+    return nominal(scene).target_poses[2][:3, 1]
 
 
 def test_a_part_is_centred_across_walls_that_are_along_none_of_its_axes(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ def test_undoing_and_doing_again_at_once_is_one_move(fixture: Scene) -> None:
     plan = nominal(fixture, schedule)
     done = moves(plan, fixture)
     assert [move.step for move in done] == [Step(0), Step(1), Step(1), Step(2)]
-    np.testing.assert_allclose(done[2].transfer.T_world_start, plan.goals[1])
+    np.testing.assert_allclose(done[2].transfer.T_world_start, plan.target_poses[1])
 
 
 def test_a_wrist_turns_back_instead_of_winding_up() -> None:
@@ -188,23 +188,23 @@ def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
     scene = one_part(tmp_path, bar, Grasp(np.array([0.0, 0.0, 0.03]), np.array([0.0, 1.0, 0.0]), ahead=ahead))
     for yaw in (0.2, np.pi):  # one of them is reached the other way round
         layout = layout_at(scene.scenario, 0.1, 0.0, yaw)
-        plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
+        plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
         (move,) = moves(plan, scene)
         np.testing.assert_allclose(move.transfer.grips[0].T_part_tip[:3, 2], ahead, atol=1e-12)
         assert is_tilted(move.transfer.T_world_start @ move.transfer.grips[0].T_part_tip)
     layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene, fidelity="near-contact")
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene, fidelity="near-contact")
     assert result.outcome.code == "ok"
 
 
 def test_the_robot_carries_an_l_shaped_bracket_by_its_arm(tmp_path: Path) -> None:
     scene = one_part(tmp_path, bracket(), Grasp(np.array([0.005, 0.0, 0.026]), np.array([1.0, 0.0, 0.0])))
     layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene)
     assert result.outcome.code == "ok"
     final = result.reached.final
     assert final is not None
-    assert final.poses["part"] == pytest.approx(layout.goals[0], abs=2e-3)
+    assert final.poses["part"] == pytest.approx(layout.poses[0], abs=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -224,5 +224,5 @@ def test_a_part_that_is_too_smooth_is_named_and_one_that_is_not_slips_no_more_th
         one_part(tmp_path, cube, SIDEWAYS, friction=0.02)
     scene = one_part(tmp_path, cube, SIDEWAYS, friction=0.2)
     layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
-    (moved,) = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene).in_hand
+    (moved,) = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene).in_hand
     assert moved.moved_m < 1e-3

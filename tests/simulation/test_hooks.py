@@ -58,7 +58,7 @@ BOTH_STEPS = [
 
 def test_a_replay_calls_its_hooks_before_and_after_each_step_and_each_tick(scene: Scene, layout: Layout) -> None:
     calls = Calls()
-    plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
+    plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
     assert replay(plan, scene, calls.hooks, fidelity="near-contact").outcome.code == "ok"
     assert calls.order == [("replay", plan), *BOTH_STEPS]
 
@@ -73,7 +73,7 @@ def test_a_demonstration_calls_the_same_hooks_but_for_that_of_the_plan(scene: Sc
 def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
     """The first part stands 40 mm beside where the plan has it, and the fingers close on nothing."""
     calls = Calls()
-    plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
+    plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
     first = scene.scenario.assembly.operations[0].main
     aside = {**layout.start, first: pose.at((0.0, 0.04, 0.0)) @ layout.start[first]}
     assert replay(plan, scene, calls.hooks, parts_at=aside, fidelity="near-contact").outcome.code != "ok"
@@ -82,7 +82,7 @@ def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
 
 def test_of_a_plan_that_is_refused_the_plan_is_said_and_no_step(scene: Scene, layout: Layout) -> None:
     calls = Calls()
-    far = np.array([pose.at((3.0, 0.0, 0.0)) @ T for T in layout.goals])
+    far = np.array([pose.at((3.0, 0.0, 0.0)) @ T for T in layout.poses])
     plan = Plan(scene.scenario.assembly, layout.start, far)
     assert replay(plan, scene, calls.hooks, fidelity="near-contact").outcome.stage == "plan"
     assert calls.order == [("replay", plan), ("tick", None)]

@@ -28,7 +28,7 @@ def plan(scene: Scene, undo_last: bool = False) -> Plan:
     layout = draw_layout(scene.scenario, np.random.default_rng([1, 0]))
     last = len(scene.scenario.assembly) - 1
     steps = (*(Step(k) for k in range(last + 1)), *([Step(last, undo=True)] if undo_last else []))
-    return Plan(scene.scenario.assembly, layout.start, layout.goals, steps)
+    return Plan(scene.scenario.assembly, layout.start, layout.poses, steps)
 
 
 def carried_mm(scene: Scene) -> list[float]:

@@ -39,9 +39,9 @@ def done(
     """Carried out at the truth, or beside it in the frame of the part."""
     scene = build_scene(scenario)
     layout = draw_layout(scenario, np.random.default_rng(1), scene.clearance_mm)
-    goals = layout.goals @ pose.at(1e-3 * np.array(off_mm))
+    goals = layout.poses @ pose.at(1e-3 * np.array(off_mm))
     plan = Plan(scenario.assembly, layout.start, goals, schedule)
-    return replay_and_judge(plan, scene, layout.goals, fidelity="near-contact")
+    return replay_and_judge(plan, scene, layout.poses, fidelity="near-contact")
 
 
 def names(scenario: Scenario) -> list[list[str]]:

@@ -16,7 +16,7 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
     scene = build_scene(load_scenario("shaft_through_brackets"), arm="panda_primitive")
     scenario = scene.scenario
     layout = draw_layout(scenario, np.random.default_rng([0, 0]), scene.clearance_mm)
-    plan = Plan(scenario.assembly, layout.start, layout.goals)
+    plan = Plan(scenario.assembly, layout.start, layout.poses)
     moves = arm_moves(plan, scene)
 
     def said(clearance_mm: float) -> Prediction:
@@ -28,11 +28,11 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
     assert tight.size_mm == pytest.approx(0.09, abs=0.03)
     assert all(move.sag[2, 3] < 0.0 and (move.margin_deg or 0.0) > 5.0 for move in moves)
     far = pose.at((0.9, 0.0, 0.0), (0.0, 0.0, 0.0))
-    away = Plan(scenario.assembly, {part: far @ T for part, T in plan.start.items()}, far @ plan.goals)
+    away = Plan(scenario.assembly, {part: far @ T for part, T in plan.start.items()}, far @ plan.target_poses)
     refused = predict(away, 0.25, scenario.thresholds, scenario.attach, arm_moves(away, scene))
     assert (refused.operation, refused.code) == (0, "unreachable_start")
     raised = {**plan.start, "table": pose.at((0.0, 0.0, 0.06), (0.0, 0.0, 0.0)) @ plan.start["table"]}
-    first = arm_moves(Plan(scenario.assembly, raised, plan.goals), scene)[0]
+    first = arm_moves(Plan(scenario.assembly, raised, plan.target_poses), scene)[0]
     assert first.struck == "table"
     assert first.struck_mm > 1.0
 
@@ -41,8 +41,8 @@ def test_joint_angles_that_were_foretold_are_not_looked_for_again(monkeypatch: p
     """Whether a plan is in reach is known once it was foretold, also where it is not."""
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
-    near = Plan(scene.scenario.assembly, layout.start, layout.goals)
-    far = Plan(scene.scenario.assembly, layout.start, pose.at((0.9, 0.0, 0.0)) @ layout.goals)
+    near = Plan(scene.scenario.assembly, layout.start, layout.poses)
+    far = Plan(scene.scenario.assembly, layout.start, pose.at((0.9, 0.0, 0.0)) @ layout.poses)
     foretold = [[move.refused for move in arm_moves(plan, scene, False)] for plan in (near, far)]
     assert foretold == [[None, None], ["unreachable", "unreachable"]]
     monkeypatch.setattr(Kinematics, "inverse", lambda *_, **__: pytest.fail("looked for again"))

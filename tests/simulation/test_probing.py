@@ -31,7 +31,7 @@ def scene(name):
 @cache
 def plan(name):
     truth = simulate_demonstration(scene(name), 0.0, 1).layout
-    return Plan(scene(name).scenario.assembly, truth.start, truth.goals)
+    return Plan(scene(name).scenario.assembly, truth.start, truth.poses)
 
 
 def drawn(name, kinds, seed=3):

@@ -17,7 +17,7 @@ SIZE = (160, 120)
 def test_a_picture_shows_where_the_parts_are(tower: Scene) -> None:
     layout = draw_layout(tower.scenario, np.random.default_rng(0))
     before = picture(tower, layout.start, *SIZE)
-    after = picture(tower, {**layout.start, "castle1": layout.goals[0]}, *SIZE)
+    after = picture(tower, {**layout.start, "castle1": layout.poses[0]}, *SIZE)
     assert before.shape == (120, 160, 3)
     assert np.abs(before.astype(int) - after).max() > 50
     assert np.array_equal(before, picture(tower, layout.start, *SIZE))

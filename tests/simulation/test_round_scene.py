@@ -171,7 +171,7 @@ def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, m
     layout = draw_layout(scene.scenario, rng)
     demonstration = demonstrate(scene, layout, 0.0, rng)
     assert demonstration.why == ""
-    assert demonstration.goals == pytest.approx(layout.goals, abs=5e-5)
+    assert demonstration.poses == pytest.approx(layout.poses, abs=5e-5)
     held: list[np.ndarray] = []
     steady = Robot.steady
 
@@ -181,7 +181,7 @@ def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, m
         steady(robot, on)
 
     monkeypatch.setattr(Robot, "steady", look)
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene)
     assert result.outcome.code == "ok"
     final = result.reached.final
     assert final is not None

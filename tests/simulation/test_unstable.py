@@ -115,11 +115,11 @@ def test_a_demonstration_that_becomes_unstable_has_failed(
     demonstration = simulate_demonstration(scene(), SETTINGS.human_error_scale, SETTINGS.seed).demonstration
     assert demonstration.code == "demonstration_failed"
     assert demonstration_failure(demonstration).sentence.endswith(": the simulation became unstable")
-    assert np.isfinite(demonstration.goals).all()
+    assert np.isfinite(demonstration.poses).all()
 
 
 def test_where_settling_fails_goals_stay_as_they_were_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: Observation = observe_demonstration(simulated(), noise_of(SETTINGS, scene(), simulated()), SETTINGS.seed)
-    assert not np.array_equal(np.asarray(settle(seen)), seen.goals)
+    assert not np.array_equal(np.asarray(settle(seen)), seen.poses)
     monkeypatch.setattr(settling.mujoco, "mj_step", fail)
-    np.testing.assert_array_equal(np.asarray(settle(seen)), seen.goals)
+    np.testing.assert_array_equal(np.asarray(settle(seen)), seen.poses)

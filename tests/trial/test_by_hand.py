@@ -17,7 +17,7 @@ def test_the_verbs_by_hand_give_the_row_of_the_trial(tower: apo_bench.Scene) -> 
     observation = apo_bench.observe(demonstration, "isotropic", noise_rng, noise_level=2.0)
     correction = apo_bench.correct(observation)
     result = apo_bench.replay(correction.plan(observation), tower)
-    verdict = apo_bench.judge(observation.assembly, result.reached, layout.goals, tower.criteria)
+    verdict = apo_bench.judge(observation.assembly, result.reached, layout.poses, tower.criteria)
     row = apo_bench.run_trial(SETTINGS, tower)
     found = verdict.rests_on
     assert verdict.success
@@ -36,9 +36,9 @@ def test_what_was_observed_is_replayed_as_it_is_unless_an_operation_was_not_seen
     seen = apo_bench.Observation(
         scenario.assembly, scenario.start, scenario.goals, np.tile(1e-6 * np.eye(6), (3, 1, 1)), np.ones(3, dtype=bool)
     )
-    np.testing.assert_array_equal(seen.plan().goals, scenario.goals)
+    np.testing.assert_array_equal(seen.plan().target_poses, scenario.goals)
     missed = apo_bench.Observation(
-        seen.assembly, seen.start, seen.goals, seen.covariance, np.array([True, False, True])
+        seen.assembly, seen.start, seen.poses, seen.covariance, np.array([True, False, True])
     )
     with pytest.raises(apo_bench.InputError, match="operation 2 was not seen"):
         missed.plan()

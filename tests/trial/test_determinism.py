@@ -29,8 +29,8 @@ def scene() -> Scene:
 def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
     careful = simulate_demonstration(scene, 0.0, 4)
     human_error_scale = simulate_demonstration(scene, 1.0, 4)
-    np.testing.assert_array_equal(careful.layout.goals, human_error_scale.layout.goals)
-    np.testing.assert_array_equal(careful.demonstration.goals[0], human_error_scale.demonstration.goals[0])
+    np.testing.assert_array_equal(careful.layout.poses, human_error_scale.layout.poses)
+    np.testing.assert_array_equal(careful.demonstration.poses[0], human_error_scale.demonstration.poses[0])
 
 
 def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> None:

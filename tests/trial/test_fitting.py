@@ -84,17 +84,19 @@ def test_a_plan_that_would_fail_is_moved_so_that_it_fits(name: str, seed: int, w
 def test_contacts_hold_as_they_did(seed: int) -> None:
     seen = seen_at("carried_bridge", seed)
     correction, found = planned("carried_bridge", seed)
-    before, after = (equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.goals, found.plan.goals))
+    before, after = (
+        equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
+    )
     assert before.max() < 1e-9
     assert after.max() < 1e-9
-    assert not np.array_equal(correction.goals, found.plan.goals)
+    assert not np.array_equal(correction.poses, found.plan.target_poses)
 
 
 @pytest.mark.parametrize(("name", "seed"), [("carried_bridge", 1), ("stick_in_tower", 1)])
 def test_a_plan_that_fits_stays_as_it_is_bit_for_bit(name: str, seed: int) -> None:
     correction, found = planned(name, seed)
-    np.testing.assert_array_equal(found.plan.goals, correction.goals)
-    np.testing.assert_array_equal(found.plan.targets, correction.plan(seen_at(name, seed)).targets)
+    np.testing.assert_array_equal(found.plan.target_poses, correction.poses)
+    np.testing.assert_array_equal(found.plan.step_poses, correction.plan(seen_at(name, seed)).step_poses)
     assert (found.moves, found.why, found.sentence) == ((), "", "")
 
 
@@ -102,11 +104,11 @@ def test_contacts_that_are_off_are_left_alone() -> None:
     """No free direction mends them."""
     seen = seen_at("carried_bridge", 96)
     scene = scene_named("carried_bridge")
-    torn = np.array(correct(seen, plain).goals)
+    torn = np.array(correct(seen, plain).poses)
     torn[3] = torn[3] @ pose.at((0.0, 0.002, 0.0), (0.0, 0.0, 0.0))
     correction = correct(seen, lambda _: torn)
     assert foretold(correction.plan(seen), scene).code == "residual"
-    np.testing.assert_array_equal(fitting_plan(correction, seen, scene).plan.goals, torn)
+    np.testing.assert_array_equal(fitting_plan(correction, seen, scene).plan.target_poses, torn)
 
 
 def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
@@ -115,7 +117,7 @@ def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
     correction, first = planned("carried_bridge", 96)
     for where in (scene, scene.scenario):
         again = fitting_plan(correction, seen, where)
-        np.testing.assert_array_equal(again.plan.goals, first.plan.goals)
+        np.testing.assert_array_equal(again.plan.target_poses, first.plan.target_poses)
         assert again.sentence == first.sentence
 
 
@@ -126,11 +128,11 @@ def test_nothing_nearer_on_the_way_back_fits_with_room() -> None:
     correction, found = planned("carried_bridge", 96)
     deep_mm = foretold(correction.plan(seen), scene).size_mm
     assert deep_mm is not None
-    relative = [pose.inverse(T[k]) @ T[4] for T in (correction.goals, found.plan.goals) for k in (0, 1)]
+    relative = [pose.inverse(T[k]) @ T[4] for T in (correction.poses, found.plan.target_poses) for k in (0, 1)]
     moved_mm = max(1e3 * abs(relative[i][0, 3] - relative[i + 2][0, 3]) for i in (0, 1))
     assert deep_mm + 2.0 == pytest.approx(moved_mm, abs=0.2)
     L = noise_factor(seen)
-    lengths = [np.linalg.norm(correction_to(seen.goals, L, T)) for T in (correction.goals, found.plan.goals)]
+    lengths = [np.linalg.norm(correction_to(seen.poses, L, T)) for T in (correction.poses, found.plan.target_poses)]
     assert lengths[0] < lengths[1] < lengths[0] + 1.0
 
 
@@ -151,7 +153,7 @@ def test_what_was_not_corrected_is_not_moved(method: str) -> None:
     made = apply_method(method, seen, truth, where=scene)
     assert made.plan is not None
     assert made.fitting is None
-    np.testing.assert_array_equal(made.plan.goals, seen.goals if method == "uncorrected" else truth)
+    np.testing.assert_array_equal(made.plan.target_poses, seen.poses if method == "uncorrected" else truth)
 
 
 def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
@@ -160,11 +162,11 @@ def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
     scene = scene_named("carried_bridge")
     correction = correct(seen, plain)
     schedule = (*map(Step, range(5)), Step(4, undo=True), Step(4))
-    targets = np.array([correction.goals[step.operation] for step in schedule])
+    targets = np.array([correction.poses[step.operation] for step in schedule])
     targets[4] = targets[5] = targets[4] @ pose.at((0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
-    found = fitting_plan(replace(correction, schedule=schedule, targets=targets), seen, scene).plan
-    np.testing.assert_array_equal(found.targets[[0, 1, 2, 3, 6]], found.goals)
-    np.testing.assert_array_equal(found.targets[4:6], targets[4:6])
+    found = fitting_plan(replace(correction, schedule=schedule, step_poses=targets), seen, scene).plan
+    np.testing.assert_array_equal(found.step_poses[[0, 1, 2, 3, 6]], found.target_poses)
+    np.testing.assert_array_equal(found.step_poses[4:6], targets[4:6])
 
 
 def test_a_trial_says_what_was_moved_and_succeeds() -> None:

@@ -26,13 +26,13 @@ def seen(goals: Array, sigma: float = 1e-3) -> Observation:
 def test_a_nominal_layout_is_found_wherever_it_stands(yaw: float) -> None:
     """The solver stops at a relative step of 1e-8: 1e-8 m was found."""
     layout = layout_at(SCENARIO, 0.13, -0.05, yaw)
-    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, seen(layout.goals)), layout.goals, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, seen(layout.poses)), layout.poses, rtol=0, atol=1e-6)
 
 
 def test_the_assembly_is_always_the_same() -> None:
     """Whatever was seen, goals lie to each other as in the file, and the assembly stands level on the table."""
     rng = np.random.default_rng(3)
-    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).goals @ np.array(
+    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses @ np.array(
         [pose.exp(np.repeat([4e-3, 0.07], 3) * rng.standard_normal(6)) for _ in SCENARIO.goals]
     )
     planned = goals_by_heart(SCENARIO.goals, seen(goals))
@@ -44,7 +44,7 @@ def test_the_assembly_is_always_the_same() -> None:
 
 def test_no_other_place_fits_better() -> None:
     """The sum of squares of the twists, a quadratic form of body twists, is least where the goals were put."""
-    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).goals
+    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses
     found = goals_by_heart(SCENARIO.goals, seen(goals))
 
     def misfit(planned: Array) -> float:
@@ -58,11 +58,11 @@ def test_no_other_place_fits_better() -> None:
 
 def test_operations_that_were_not_seen_are_left_out() -> None:
     layout = layout_at(SCENARIO, 0.13, -0.05, 0.3)
-    goals = np.array(layout.goals)
+    goals = np.array(layout.poses)
     goals[1, :3, 3] += 1.0
-    partly = replace(seen(goals), seen=np.array([True, False, True]))
-    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, partly), layout.goals, rtol=0, atol=1e-6)
-    nothing = apply_method("nominal", replace(partly, seen=np.zeros(3, dtype=bool)), None, where=SCENARIO)
+    partly = replace(seen(goals), observed=np.array([True, False, True]))
+    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, partly), layout.poses, rtol=0, atol=1e-6)
+    nothing = apply_method("nominal", replace(partly, observed=np.zeros(3, dtype=bool)), None, where=SCENARIO)
     assert nothing.plan is None
     assert nothing.failure is not None
     assert nothing.failure.code == "not_seen"

@@ -67,7 +67,7 @@ def test_the_same_trial_promises_the_same_bytes(scene: Scene, simulated: Simulat
 def test_a_promise_never_sees_the_truth(scene: Scene, simulated: SimulatedDemonstration) -> None:
     """The same observation before another truth: the same promise, though the plan is wrong now."""
     off = pose.at((0.0, 0.0, 0.03), (0.0, 0.0, 40.0))
-    elsewhere = replace(simulated, layout=replace(simulated.layout, goals=simulated.layout.goals @ off))
+    elsewhere = replace(simulated, layout=replace(simulated.layout, poses=simulated.layout.poses @ off))
     right, wrong = row(scene, simulated), row(scene, elsewhere)
     assert right["predicted_success"] == wrong["predicted_success"]
     assert wrong["planned_error_fixed_mm"] > 10.0 > right["planned_error_fixed_mm"]
@@ -143,14 +143,14 @@ def test_the_likelier_a_rival_whose_contacts_the_plan_breaks_the_less_it_promise
     relations = seen.assembly.relations()
     made = [any(relations[j].made == last for j in arc) for arc in seen.assembly.arcs()]
     dropped = tuple(f"R{i}" for i, own in enumerate(made, start=1) if own)
-    aside = correction.goals.copy()
+    aside = correction.poses.copy()
     aside[last, :3, 3] += 0.0005
-    plan = correction.plan(seen).with_goals(aside)
+    plan = correction.plan(seen).with_target_poses(aside)
     predicted_success = []
     for weight in (0.99, 0.8, 0.5, 0.1):
         without = Hypothesis(weight, aside, correction.covariance, seen, (), dropped)
-        holding = Hypothesis(1.0 - weight, correction.goals, correction.covariance, seen)
-        torn = replace(correction, goals=aside, hypotheses=(without, holding))
+        holding = Hypothesis(1.0 - weight, correction.poses, correction.covariance, seen)
+        torn = replace(correction, poses=aside, hypotheses=(without, holding))
         predicted_success.append(predict_success(plan, seen, torn, scene.scenario))
     assert predicted_success == sorted(predicted_success, reverse=True)
     assert predicted_success[0] - predicted_success[-1] > 0.2
@@ -171,7 +171,7 @@ def test_where_nothing_was_seen_nobody_knows_which_way_all_of_it_is_turned() -> 
     assert correction.ok
     plan = correction.plan(nothing)
     turned, right = (
-        predict_success(plan, replace(nothing, seen=np.full(n, seen)), correction, known) for seen in (False, True)
+        predict_success(plan, replace(nothing, observed=np.full(n, seen)), correction, known) for seen in (False, True)
     )
     assert turned < 0.6 < 0.8 < right
 
@@ -181,9 +181,9 @@ def test_truths_are_drawn_where_contacts_hold(scene: Scene, simulated: Simulated
 
     seen = observe_demonstration(simulated, noise_of(asked(noise_mm=0.1, noise_deg=0.1), scene, simulated), SEED)
     correction = correct(seen, "contact")
-    truths = drawn_truths(Explanation(1.0, seen, correction.goals), 8, np.random.default_rng(0))
+    truths = drawn_truths(Explanation(1.0, seen, correction.poses), 8, np.random.default_rng(0))
     gaps = [largest_gap(seen.assembly, seen.start, goals) for goals in truths]
-    moved = np.abs(truths - correction.goals).max(axis=(1, 2, 3))
+    moved = np.abs(truths - correction.poses).max(axis=(1, 2, 3))
     assert max(gaps) < 1e-4 < max(moved)
 
 

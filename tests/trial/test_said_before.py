@@ -42,7 +42,7 @@ def given() -> tuple[Scene, Observation, Array]:
     scene = scene_of(MISSED)
     simulated = simulate_demonstration(scene, MISSED.human_error_scale, MISSED.seed)
     seen = observe_demonstration(simulated, trial.noise_of(MISSED, scene, simulated), MISSED.seed)
-    return scene, seen, simulated.layout.goals
+    return scene, seen, simulated.layout.poses
 
 
 def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation, Array]) -> None:

@@ -55,17 +55,17 @@ def rows(scene: Scene, shown: SimulatedDemonstration) -> dict[str, dict[str, Any
 def refuses(seen: Observation) -> Correction:
     """A corrector that never converges."""
     tried = (Try(2, (2,), float("inf")),)
-    return Correction(seen.goals, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
+    return Correction(seen.poses, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
 
 
 def rebuilds(seen: Observation) -> Correction:
     """Tracking as the paper shows it for example 5.1: castle 2 is put down as seen, taken off and put down rightly."""
     made = correct(seen, "paper")
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    targets = made.goals[[step.operation for step in schedule]]
-    targets[1:3] = seen.goals[1]
+    targets = made.poses[[step.operation for step in schedule]]
+    targets[1:3] = seen.poses[1]
     tried = (Try(np.int64(2), (np.int64(2),), 1.5e-3), Try(2, (2, 1), 1e-5))
-    return replace(made, freed=(2, 1), tried=tried, schedule=schedule, targets=targets)
+    return replace(made, freed=(2, 1), tried=tried, schedule=schedule, step_poses=targets)
 
 
 def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) -> None:
@@ -123,7 +123,7 @@ def test_a_schedule_is_carried_out_and_counted(
     planned = apply_method(rebuilds, seen, None).plan
     assert planned is not None
     assert planned.schedule == made.schedule
-    np.testing.assert_array_equal(planned.targets, made.targets)
+    np.testing.assert_array_equal(planned.step_poses, made.step_poses)
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: made)
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert row["tried_corrections"] == [
@@ -244,7 +244,7 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
 
 
 def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown: SimulatedDemonstration) -> None:
-    planned = apply_method(refuses, observed(scene, shown), shown.layout.goals)
+    planned = apply_method(refuses, observed(scene, shown), shown.layout.poses)
     assert planned.plan is None
     assert planned.failure is not None
     assert (planned.failure.stage, planned.failure.code) == ("correct", "not_converged")
@@ -253,15 +253,15 @@ def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown
 
 
 def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: SimulatedDemonstration) -> None:
-    seen = replace(observed(scene, shown), seen=np.array([True, False, True]))
-    raw = apply_method("uncorrected", seen, shown.layout.goals)
+    seen = replace(observed(scene, shown), observed=np.array([True, False, True]))
+    raw = apply_method("uncorrected", seen, shown.layout.poses)
     assert raw.plan is None
     assert raw.failure is not None
     assert (raw.failure.stage, raw.failure.code, raw.failure.operation) == ("observe", "not_seen", 1)
     assert "operation 2" in raw.failure.sentence
-    oracle = apply_method("oracle", seen, shown.layout.goals)
+    oracle = apply_method("oracle", seen, shown.layout.poses)
     assert oracle.plan is not None
-    np.testing.assert_array_equal(oracle.plan.goals, shown.layout.goals)
+    np.testing.assert_array_equal(oracle.plan.target_poses, shown.layout.poses)
 
 
 def test_a_row_without_replay_is_a_failure_with_null_physics(
@@ -287,10 +287,10 @@ def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedD
 
 def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: SimulatedDemonstration) -> None:
     """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
-    planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
+    planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.poses)
     assert planned.plan is not None
     assert planned.gap_after_m < 1e-9
-    verdict = stages.replay_and_judge(planned.plan, scene, shown.layout.goals).verdict
+    verdict = stages.replay_and_judge(planned.plan, scene, shown.layout.poses).verdict
     assert (verdict.as_demonstrated, verdict.demonstrated.code) == (False, "overlap")
 
 
@@ -310,9 +310,9 @@ def test_a_measured_observation_has_no_truth(scene: Scene, shown: SimulatedDemon
 
 
 def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown: SimulatedDemonstration) -> None:
-    layout = shown.layout.goals
+    layout = shown.layout.poses
     nominal = scene.scenario.goals
-    exact = replace(observed(scene, shown), goals=layout)
+    exact = replace(observed(scene, shown), poses=layout)
     reference = nominal_where_seen(nominal, exact)
     np.testing.assert_allclose(reference[0], layout[0], rtol=0, atol=1e-12)
     steps = [pose.inverse(goals[0]) @ goals[1] for goals in (reference, nominal)]

@@ -36,7 +36,7 @@ def scene(name: str) -> Scene:
 @cache
 def plan(name: str) -> Plan:
     layout = layout_at(load_scenario(name), 0.1, 0.0, 0.3)
-    return Plan(scene(name).scenario.assembly, layout.start, layout.goals)
+    return Plan(scene(name).scenario.assembly, layout.start, layout.poses)
 
 
 @cache

@@ -23,7 +23,7 @@ TOOL = pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
 def form(name: str, frames: RobotFrames) -> dict[str, Any]:
     scenario = load_scenario(name)
     layout = layout_at(scenario, 0.1, 0.0, 0.3)
-    plan = Plan(scenario.assembly, layout.start, layout.goals)
+    plan = Plan(scenario.assembly, layout.start, layout.poses)
     return robot_form(plan_lines(plan, scenario), plan, scenario, frames)
 
 
@@ -43,7 +43,7 @@ def numbers(said: Any) -> list[float | str]:
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pocket_table"])
 def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) -> None:
-    goals = layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
+    goals = layout_at(load_scenario(name), 0.1, 0.0, 0.3).poses
     for step, goal in zip(form(name, RobotFrames())["steps"], goals, strict=True):
         grip = matrix(step["grasp"]["tip_in_part"])
         assert np.allclose(matrix(step["motions"][-1]["to"]), goal @ grip, atol=1e-9)
@@ -87,7 +87,7 @@ def test_a_part_that_is_taken_out_again_leaves_its_contacts_one_after_the_other(
     scenario = load_scenario("wedge_under_roof")
     layout = layout_at(scenario, 0.1, 0.0, 0.3)
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1))
-    plan = Plan(scenario.assembly, layout.start, layout.goals, schedule)
+    plan = Plan(scenario.assembly, layout.start, layout.poses, schedule)
     lines = plan_lines(plan, scenario)
     undone = robot_form(lines, plan, scenario, RobotFrames())["steps"][2]
     departs = len(lines[2].leaves.departs)
@@ -96,5 +96,5 @@ def test_a_part_that_is_taken_out_again_leaves_its_contacts_one_after_the_other(
     assert np.allclose(matrix(first["to"]), matrix(second["from"]), atol=1e-9)
     assert first["direction"] != second["direction"]
     grip = matrix(undone["grasp"]["tip_in_part"])
-    assert np.allclose(matrix(first["from"]), layout.goals[1] @ grip, atol=1e-9)
+    assert np.allclose(matrix(first["from"]), layout.poses[1] @ grip, atol=1e-9)
     assert np.allclose(matrix(undone["part_at_goal"]), layout.start[undone["part"]], atol=1e-9)

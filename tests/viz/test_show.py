@@ -19,20 +19,20 @@ SHIFT_M = 2e-3
 def lifted() -> Observation:
     """Example 5.1 with castle 2 seen 2 mm too high, and the stick half a millimetre."""
     seen = as_planned(load_scenario("stick_in_tower"), 1.0, 1.0)
-    goals = np.array(seen.goals)
+    goals = np.array(seen.poses)
     goals[1, 2, 3] += SHIFT_M
     goals[2, 2, 3] += SHIFT_M / 4
-    return Observation(seen.assembly, seen.start, goals, seen.covariance, seen.seen, seen.gap_m)
+    return Observation(seen.assembly, seen.start, goals, seen.covariance, seen.observed, seen.gap_m)
 
 
 def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     seen = lifted()
-    found = belief_panel("as seen", seen, seen.goals, 3)
+    found = belief_panel("as seen", seen, seen.poses, 3)
     assert found.gap_m == pytest.approx(SHIFT_M)
     wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
     assert found.open == wrong
-    np.testing.assert_array_equal(found.poses["castle2"], seen.goals[1])
-    mended = belief_panel("corrected", seen, correct(seen, "contact").goals, 3)
+    np.testing.assert_array_equal(found.poses["castle2"], seen.poses[1])
+    mended = belief_panel("corrected", seen, correct(seen, "contact").poses, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
     assert belief_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
 
@@ -40,7 +40,7 @@ def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
 def test_disappeared_contacts_are_said_to_be() -> None:
     scenario = load_scenario("vanished_fixture")
     seen = as_planned(scenario, 1.0, 1.0)
-    goals = np.array(seen.goals)
+    goals = np.array(seen.poses)
     goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
     found = belief_panel("as seen", seen, goals, len(goals))
     assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)

@@ -25,7 +25,7 @@ from apo_bench.viz.finished_trial import trial_again
 from apo_bench.viz.stepping import FACES, Cursor
 
 
-def with_goals(scene: Scene) -> Rollout:
+def with_target_poses(scene: Scene) -> Rollout:
     """What the tower asks for, as if it had been seen 1 cm aside."""
     rollout = scenario_story(scene)
     true = scene.scenario.goals
@@ -77,7 +77,7 @@ def test_chapters_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None
 
 
 def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> None:
-    cursor = Cursor(with_goals(tower))
+    cursor = Cursor(with_target_poses(tower))
     cursor.go(2)
     assert "as seen: 10.00 mm, 0.00 degrees off" in cursor.words()
     assert "as it is now: 0.00 mm, 0.00 degrees off" in cursor.words()
@@ -154,7 +154,7 @@ def test_keys_of_the_window_move_what_is_shown(tower: Scene, monkeypatch: pytest
 
     monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=launch))
     monkeypatch.setattr(mujoco, "viewer", SimpleNamespace(launch_passive=launch), raising=False)
-    cursor = Cursor(with_goals(tower))
+    cursor = Cursor(with_target_poses(tower))
     step_in_window(tower, cursor.rollout.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
     (window,) = windows
     assert ["at the start" in window.texts[0], "operation 1 of 3" in window.texts[1]] == [True, True]
@@ -207,7 +207,7 @@ def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
     from apo_bench.viz.browser import serve_story
 
     said: list[str] = []
-    serve_story(with_goals(tower), 18417, said.append, ends=lambda: bool(said))
+    serve_story(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
     assert said[0].startswith("Open http://127.0.0.1:18")
 
 
@@ -217,7 +217,7 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
 
     server = MagicMock()
     monkeypatch.setattr(browser, "_server", lambda _: server)
-    page = browser.Page(with_goals(tower), 8080)
+    page = browser.Page(with_target_poses(tower), 8080)
     cursor = page.cursor
     groups = server.gui.add_button_group.call_args_list
     clicked = server.gui.add_button_group.return_value.on_click.call_args_list

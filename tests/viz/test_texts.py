@@ -49,7 +49,7 @@ def table_lines(table: object) -> list[list[str]]:
 
 def corrected(observation: Observation, **changes: object) -> Correction:
     """Everything as seen but the second goal, 3 mm along its own x and turned by 2 degrees about its own z."""
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[1] = goals[1] @ pose.at((0.003, 0.0, 0.0), (0.0, 0.0, 2.0))
     correction = Correction(goals, "converged", "all contacts are made", (2, 1, 0), 4e-3, 1e-9, 13)
     return replace(correction, **changes)  # type: ignore[arg-type]

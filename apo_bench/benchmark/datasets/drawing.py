@@ -93,9 +93,9 @@ def observe_many(
 
 def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
     return Seen(
-        np.concatenate([seen.goals for seen in observations]).reshape(n, k, 4, 4),
+        np.concatenate([seen.poses for seen in observations]).reshape(n, k, 4, 4),
         np.concatenate([seen.covariance for seen in observations]).reshape(n, k, 6, 6),
-        np.concatenate([seen.seen for seen in observations]).reshape(n, k),
+        np.concatenate([seen.observed for seen in observations]).reshape(n, k),
     )
 
 

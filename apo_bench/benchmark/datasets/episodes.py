@@ -274,11 +274,11 @@ def _episode(
         **{name: row.get(name) for name in _OF_ROW},
         "parts": recorder.parts,
         "main_parts": [operation.main for operation in seen.assembly.operations],
-        "seen_goals": _flat(seen.goals),
+        "seen_goals": _flat(seen.poses),
         "covariance": seen.covariance.ravel().tolist(),
-        "seen": seen.seen.tolist(),
-        "true_goals": _flat(simulated.layout.goals),
-        "planned_goals": None if plan is None else _flat(plan.goals),
+        "seen": seen.observed.tolist(),
+        "true_goals": _flat(simulated.layout.poses),
+        "planned_goals": None if plan is None else _flat(plan.target_poses),
         "schedule": None if plan is None else [-(k + 1) if undo else k + 1 for k, undo in plan.schedule],
     }
 

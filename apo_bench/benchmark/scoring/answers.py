@@ -49,7 +49,7 @@ def read_answers(path: Path) -> dict[str, Array]:
     for number, line in enumerate(text.split("\n"), start=1):
         if line.strip():
             answer = parse_json(line, f"{path}, line {number}")
-            request = answer.fields(("id", "goals"))["id"].text()
+            request = answer.fields(("id", "poses"))["id"].text()
             require(request not in answers, f"{path}, line {number}: a second answer for {request}; keep one.")
             answers[request] = goals_of(answer)
     return answers

@@ -2,7 +2,7 @@
 
 A request, `apo-bench/request/1`, is all that a corrector may use: an observation as files have it, with `carries` and
 `contacts` (pairs of `part.face`) in each operation, `faces` (`part.face` -> a point and a direction in the frame of the
-part, radii where it is round), `fixed` parts, and an `id`. The answer is `{"goals": [pose, ...]}`, one pose
+part, radii where it is round), `fixed` parts, and an `id`. The answer is `{"poses": [pose, ...]}`, one pose
 (`position_mm`, `quaternion_wxyz`) for each operation.
 """
 
@@ -63,7 +63,7 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
     require(process.returncode == 0, f"{program} ended with exit code {process.returncode}.")
     require(answer.strip(), f"{program} wrote no answer; one line of JSON is needed.")
     where = f"the answer of {program.removeprefix('the program ')}"
-    return goals_of(parse_json(decoded(answer, where, "JSON"), where), len(observation.goals))
+    return goals_of(parse_json(decoded(answer, where, "JSON"), where), len(observation.poses))
 
 
 def request_line(observation: Observation) -> str:
@@ -96,7 +96,7 @@ def goals_of(answer: JsonNode, operations: int | None = None) -> Array:
     Raises:
         InputError: It is no answer.
     """
-    poses = answer.fields(("goals",), ("id",))["goals"].items("goal", operations)
+    poses = answer.fields(("poses",), ("id",))["poses"].items("goal", operations)
     return np.array([_pose_of(entry) for entry in poses]).reshape(-1, 4, 4)
 
 

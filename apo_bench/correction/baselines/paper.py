@@ -15,19 +15,19 @@ def paper(observation: Observation) -> Correction:
         `inconsistent`, `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the
         candidates; rank and trace are those of their joint solution.
     """
-    if not observation.seen.all():
+    if not observation.observed.all():
         return refused_correction(observation)
-    system = equations(observation.assembly, observation.start, observation.goals)
-    before = system.gaps(observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
+    before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
-    solution = solve_newton(system.among(system.containing(freed)), observation.goals, freed)
+    solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)
     status = solver_status(solution, largest(system.gaps(solution.goals)), observation.gap_m)
     goals = solution.goals
     if status == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
             goals = solve_own_contacts(system, goals, k, observation.gap_m)
     return Correction(
-        goals=goals,
+        poses=goals,
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=freed,

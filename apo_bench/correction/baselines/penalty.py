@@ -202,13 +202,13 @@ class Loss:
 
 def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss:
     """The loss of an observation."""
-    system = equations(observation.assembly, observation.start, observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 
 def _descended(observation: Observation, contact_m: float, length: float) -> Array:
     down = loss(observation, contact_m)
-    z = np.zeros(6 * len(observation.goals))
+    z = np.zeros(6 * len(observation.poses))
     m = np.zeros_like(z)
     v = np.zeros_like(z)
     for t in range(1, ADAM_STEPS + 1):
@@ -247,8 +247,8 @@ def _solved(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
     space = whitened(observation)
-    system = equations(observation.assembly, observation.start, observation.goals)
-    prior = np.eye(6 * len(observation.goals))
+    system = equations(observation.assembly, observation.start, observation.poses)
+    prior = np.eye(6 * len(observation.poses))
 
     def residual(z: Array) -> Array:
         return np.concatenate([system.residual(space.goals(z)) / contact_m, z])

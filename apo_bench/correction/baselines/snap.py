@@ -30,7 +30,7 @@ def snap(observation: Observation) -> Correction:
 
 
 def _snapped(observation: Observation) -> Array:
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     space = whitened(observation)
     system = equations(observation.assembly, observation.start, goals)
     for k in range(len(goals)):

@@ -116,9 +116,9 @@ class TrackedOperation:
 
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
-    if not observation.seen.all():
+    if not observation.observed.all():
         return refused_correction(observation)
-    now = np.array(observation.goals)
+    now = np.array(observation.poses)
     schedule = list[Step]()
     targets = list[Array]()
     steps = list[TrackedOperation]()
@@ -176,19 +176,19 @@ def _report(
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
-    system = equations(observation.assembly, observation.start, observation.goals)
+    system = equations(observation.assembly, observation.start, observation.poses)
     status = steps[-1].status if steps else "converged"
     last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, status))
     return Correction(
-        goals=goals,
+        poses=goals,
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
-        gap_before_m=largest(system.gaps(observation.goals)),
+        gap_before_m=largest(system.gaps(observation.poses)),
         gap_after_m=largest(system.gaps(goals)),
         rank=last.rank,
         trace=last.trace,
         tried=tuple(one for step in steps for one in step.tried),
         schedule=schedule,
-        targets=targets,
+        step_poses=targets,
     )

@@ -76,23 +76,23 @@ def _check_words(correction: Correction, assembly: Assembly, name: str) -> None:
 
 
 def _check_schedule(correction: Correction, name: str) -> None:
-    if correction.schedule and (wrong := schedule_fault(correction.schedule, len(correction.goals))):
+    if correction.schedule and (wrong := schedule_fault(correction.schedule, len(correction.poses))):
         raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {SCHEDULE_REMEDY}.")
-    if correction.targets is None:
+    if correction.step_poses is None:
         return
     require(
         correction.schedule,
         f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets.",
     )
-    for j in np.flatnonzero(~is_rigid(correction.targets)):
+    for j in np.flatnonzero(~is_rigid(correction.step_poses)):
         raise InputError(
             f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "
             f"{RIGID}."
         )
-    check_near(correction.targets, name, "a target for step")
+    check_near(correction.step_poses, name, "a target for step")
     ends = {step.operation: i for i, step in enumerate(correction.schedule) if not step.undo}
     for k, i in ends.items():
-        if np.abs(correction.targets[i] - correction.goals[k]).max() > _SAME:
+        if np.abs(correction.step_poses[i] - correction.poses[k]).max() > _SAME:
             raise InputError(
                 f"the corrector '{name}' returned a last target for operation {k + 1} that is not its goal; "
                 "return goals that are the targets in force at the end."
@@ -130,7 +130,7 @@ def check_observations(observations: Sequence[Observation]) -> None:
             return f"the start of '{parts[j]}' in {_name(observations, 0)}"
         return f"the goal of {_operation(observations, j - len(parts))}"
 
-    rows = [*map(first.start.__getitem__, parts), *(observation.goals.reshape(-1, 4) for observation in observations)]
+    rows = [*map(first.start.__getitem__, parts), *(observation.poses.reshape(-1, 4) for observation in observations)]
     _check_poses(np.concatenate(rows).reshape(-1, 4, 4), name)
     C = np.concatenate([observation.covariance for observation in observations])
     off = C - np.swapaxes(C, 1, 2)
@@ -170,7 +170,7 @@ def _check_poses(T: Array, name: Callable[[int], str]) -> None:
 
 def _operation(observations: Sequence[Observation], j: int) -> str:
     """Row j of all operations of all observations: `operation 2 in observation 3`."""
-    i, k = [(i, k) for i, observation in enumerate(observations) for k in range(len(observation.goals))][j]
+    i, k = [(i, k) for i, observation in enumerate(observations) for k in range(len(observation.poses))][j]
     return f"operation {k + 1} in {_name(observations, i)}"
 
 

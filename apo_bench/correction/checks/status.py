@@ -64,7 +64,7 @@ def opposing(observation: Observation, correction: Correction) -> Correction:
     if not correction.ok:
         return correction
     assembly = observation.assembly
-    away = looking_away(assembly, observation.start, correction.goals)
+    away = looking_away(assembly, observation.start, correction.poses)
     if correction.dropped:
         away &= assembly.without(correction.dropped)
     if not away.any():
@@ -78,9 +78,9 @@ def opposing(observation: Observation, correction: Correction) -> Correction:
 
 def refused_correction(observation: Observation) -> Correction:
     """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
-    missing = int(np.argmin(observation.seen))
-    now = largest_gap(observation.assembly, observation.start, observation.goals)
-    return Correction(observation.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)
+    missing = int(np.argmin(observation.observed))
+    now = largest_gap(observation.assembly, observation.start, observation.poses)
+    return Correction(observation.poses, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)
 
 
 TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
@@ -95,12 +95,12 @@ def goals_as_given(observation: Observation, goals: Array, sentence: str) -> Cor
     Returns:
         `converged`; `not_finite`, and what was seen, if a number is not finite.
     """
-    before = largest_gap(observation.assembly, observation.start, observation.goals)
+    before = largest_gap(observation.assembly, observation.start, observation.poses)
     if not np.isfinite(goals).all():
-        return Correction(observation.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
+        return Correction(observation.poses, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
     e, J = equations(observation.assembly, observation.start, goals).linearised(goals)
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(goals)), e, SINGULAR_CUT_OFF)
-    freed = tuple(int(k) for k in np.flatnonzero((goals != observation.goals).any(axis=(1, 2)))[::-1])
+    freed = tuple(int(k) for k in np.flatnonzero((goals != observation.poses).any(axis=(1, 2)))[::-1])
     after = largest(e)
     sentence = status_sentence("converged", observation.gap_m) if after <= observation.gap_m else sentence
     return Correction(goals, "converged", sentence, freed, before, after, rank)
@@ -113,7 +113,7 @@ def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()
         dropped: Relations, or single contacts, that do not count.
     """
     observation = lowered_observation(observation)
-    plain = equations(observation.assembly, observation.start, observation.goals)
+    plain = equations(observation.assembly, observation.start, observation.poses)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     return largest(violations(system, exact, inequalities, goals)[observation.assembly.without(dropped)])
 
@@ -128,9 +128,9 @@ def as_it_ends(observation: Observation, mended: Callable[[Observation], Array],
     Returns:
         As `goals_as_given`, or `not_seen`; what was seen where there is no contact.
     """
-    if not observation.seen.all():
+    if not observation.observed.all():
         return refused_correction(observation)
-    goals = mended(observation) if observation.assembly.relations() else observation.goals
+    goals = mended(observation) if observation.assembly.relations() else observation.poses
     left_m = largest_gap(observation.assembly, observation.start, goals)
     return goals_as_given(observation, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")
 

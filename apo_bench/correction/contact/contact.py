@@ -136,10 +136,10 @@ class ContactCorrector:
         """
         # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
         observations = lowered_together(observations)
-        results = [None if all(each.seen.tolist()) else refused_correction(each) for each in observations]
+        results = [None if all(each.observed.tolist()) else refused_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(
-            6 * len(observation.goals) > LARGEST_DENSE or observation.shared or observation.tails
+            6 * len(observation.poses) > LARGEST_DENSE or observation.shared or observation.tails
             for observation in observations
         )
         for batch in ([i] for i in whole) if alone else [whole] if whole else []:
@@ -217,12 +217,12 @@ class ContactCorrector:
             status = "doubtful"
         goals = solved.goals
         if not np.isfinite(goals).all():
-            goals = problem.observations[i].goals
+            goals = problem.observations[i].poses
             status = "not_finite"
         of = f"every contact but those of {', '.join(dropped)}" if dropped else "every contact"
         doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
-            goals=goals,
+            poses=goals,
             status=status,
             sentence=status_sentence(status, gap_m, of) + turned + doubts,
             freed=problem.laid.pattern.freed,

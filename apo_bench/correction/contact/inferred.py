@@ -80,7 +80,7 @@ class Inferred(NamedTuple):
 
 def inferred_goals(observation: Observation, unknown: Collection[int]) -> Inferred:
     """The goals of an observation, those of `unknown` operations, counted from 0, replaced by what contacts say."""
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     left = set(unknown)
     baseless = list[int]()
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)

@@ -161,7 +161,7 @@ def problem_of(
     first = observations[0]
     assembly = first.assembly
     shared = any(observation.shared for observation in observations)
-    goals = np.concatenate([observation.goals for observation in observations]).reshape(len(observations), -1, 4, 4)
+    goals = np.concatenate([observation.poses for observation in observations]).reshape(len(observations), -1, 4, 4)
     start = np.concatenate([np.zeros((0, 4)), *(first.start[part] for part in assembly.solids)]).reshape(-1, 4, 4)
     demands = _demands(assembly, first.play_m)
     by = kernels() if compiled else None
@@ -214,5 +214,5 @@ def _factors(observations: Sequence[Observation]) -> Array:
 def seen_system(observation: Observation) -> CompactEquations:
     """The equations of every contact, each vertex where it was seen."""
     return compact_equations(
-        equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
+        equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
     )

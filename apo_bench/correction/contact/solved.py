@@ -75,7 +75,7 @@ def _drawn(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) -
     """z of errors, (DRAWS, 6 n); of operations that are left out of none."""
     if observation.tails is None:
         raise ValueError("the observation states no tails")
-    joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
+    joint = joint_covariance(observation.poses, observation.covariance, observation.shared)
     twists = observation.tails.draws(joint, DRAWS)
     twists[:, list(left_out)] = 0.0
     return coordinates_of(L, twists)

@@ -62,7 +62,7 @@ def turned_words(problem: Problem, goals: Array) -> str:
     """Which operations the corrected goals say to have been seen turned, if another start was needed to find them."""
     if problem.begin is None:
         return ""
-    R = np.swapaxes(problem.observation.goals[:, :3, :3], 1, 2) @ goals[:, :3, :3]
+    R = np.swapaxes(problem.observation.poses[:, :3, :3], 1, 2) @ goals[:, :3, :3]
     angles = np.degrees(np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
     far = [f"operation {k + 1} by {angle:.0f} degrees" for k, angle in enumerate(angles) if angle > FAR_DEG]
     return f"; seen turned: {', '.join(far)}" if far else ""
@@ -93,12 +93,12 @@ def _starts(problem: Problem, first: Solved) -> Array:
     """Goals to begin with, (b, n, 4, 4)."""
     observation = problem.observation
     doubted = _doubted(problem, first)
-    n = len(observation.goals)
+    n = len(observation.poses)
     starts = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
-    turned = [observation.goals]
+    turned = [observation.poses]
     for k in doubted:
         for g in symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
-            goals = np.array(observation.goals)
+            goals = np.array(observation.poses)
             goals[k] = goals[k] @ g
             turned.append(goals)
     away = looking_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
@@ -108,14 +108,14 @@ def _starts(problem: Problem, first: Solved) -> Array:
 def _doubted(problem: Problem, first: Solved) -> Collection[int]:
     """The operations of which one may be seen far off: all, or those with a part in most contacts that do not hold."""
     observation = problem.observation
-    n = len(problem.observation.goals)
+    n = len(problem.observation.poses)
     if n <= _MOST:
         return range(n)
     bad = looking_away(observation.assembly, observation.start, first.goals)
     bad |= ~(first.gaps <= observation.gap_m)
     letters = pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
-    turned = np.einsum("nij,nij->n", observation.goals[:, :3, :3], first.goals[:, :3, :3])
+    turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.goals[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
 
 
@@ -127,22 +127,22 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
     laid = laid_contacts(observation.assembly, start, problem.demands.plane, starts)
     system = laid.system.among(problem.demands.exact)
-    z = correction_to(observation.goals, L, starts)
+    z = correction_to(observation.poses, L, starts)
     if 6 * n <= LARGEST_DENSE:
-        seen = np.broadcast_to(observation.goals, starts.shape)
+        seen = np.broadcast_to(observation.poses, starts.shape)
         results = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
     else:
         result = (system.only(i) for i in range(b))
-        results = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(result, z, strict=True)]
+        results = [nearest_goals(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]
     goals = np.concatenate([result.goals.reshape(-1, n, 4, 4) for result in results])
     rest = np.concatenate([np.atleast_1d(result.at_rest) for result in results])
     e = np.concatenate([np.atleast_2d(result.e) for result in results])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
     holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
     # The nearest first, since only the nearest that holds is of use.
-    z = correction_to(observation.goals, problem.L[0], goals[holds])
+    z = correction_to(observation.poses, problem.L[0], goals[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield goals[i]
         else:
-            yield descended(system.only(int(i)), observation.goals, L, goals[i])
+            yield descended(system.only(int(i)), observation.poses, L, goals[i])

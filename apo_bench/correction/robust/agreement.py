@@ -35,7 +35,7 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], belie
     left_out = unbelieved(states)
     wide = np.array(believed.covariance)
     wide[list(left_out)] = ROOM
-    e, Jt = linearised_by(seen_system(believed), believed.goals, noise_factor(replace(believed, covariance=wide)))
+    e, Jt = linearised_by(seen_system(believed), believed.poses, noise_factor(replace(believed, covariance=wide)))
     _, soft = softened(believed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)
@@ -59,13 +59,13 @@ class ContactAgreement:
         seen = believed_observation(case, states)
         self._unknown = unbelieved(states)
         system = seen_system(seen)
-        self._e, self._Jt = linearised_by(system, seen.goals, noise_factor(seen))
+        self._e, self._Jt = linearised_by(system, seen.poses, noise_factor(seen))
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
         letters = pattern(seen.assembly).letters - len(seen.assembly.solids)
         c = len(system)
-        self._uses = (letters[..., None] == np.arange(len(seen.goals))).any(axis=1)
+        self._uses = (letters[..., None] == np.arange(len(seen.poses))).any(axis=1)
         # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.
         each = self._e.reshape(c, 3, 1), self._S.reshape(c, 3, c, 3)[np.arange(c), :, np.arange(c)]
         self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))

@@ -199,7 +199,7 @@ def mode_covariance(hypotheses: Sequence[Hypothesis]) -> Array | None:
     for one in hypotheses:
         if one.covariance is None:
             continue
-        off = pose.log(pose.inverse(first.goals) @ one.goals)
+        off = pose.log(pose.inverse(first.poses) @ one.poses)
         both = first.covariance + one.covariance + _FINE
         if (np.einsum("ki,ki->k", off, np.linalg.solve(both, off[..., None])[..., 0]) > _APART).any():
             continue

@@ -121,11 +121,11 @@ class SolvedHypothesis:
         wide = observation.covariance * self.scale**2
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
-        xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
+        xi = pose.log(pose.inverse(observation.poses) @ correction.poses)
         L = noise_factor(replace(observation, covariance=wide))
-        _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
+        _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
         wrong, soft = softened(observation, self.dropped)
-        false = np.where(wrong, system.residual(correction.goals) / soft, 0.0) if self.dropped else np.zeros(len(soft))
+        false = np.where(wrong, system.residual(correction.poses) / soft, 0.0) if self.dropped else np.zeros(len(soft))
         S = Jt.T @ Jt + np.diag(soft * soft)
         unlikely = correction.test.chi_square / self.scale**2 + false @ false + np.linalg.slogdet(S)[1]
         surprise = prior_surprise(self.case, self.states, self.dropped)
@@ -165,12 +165,12 @@ class SolvedHypothesis:
     def goals_at(self, goals: Array, unknown: Sequence[int]) -> Array | None:
         """Its goals, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
         correction = _corrected(self._moved(goals, unknown), self.dropped)
-        return correction.goals if correction.ok and self.stands_at(correction.goals) else None
+        return correction.poses if correction.ok and self.stands_at(correction.poses) else None
 
     def _moved(self, goals: Array, unknown: Sequence[int]) -> Observation:
-        there = np.array(self.observation.goals)
+        there = np.array(self.observation.poses)
         there[list(unknown)] = goals[list(unknown)]
-        return replace(self.observation, goals=there)
+        return replace(self.observation, poses=there)
 
     def stands_at(self, goals: Array) -> bool:
         """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
@@ -179,7 +179,7 @@ class SolvedHypothesis:
         return not (away & observation.assembly.without(self.dropped)).any()
 
     def _faces_oppose(self) -> bool:
-        return self.stands_at(self.correction.goals)
+        return self.stands_at(self.correction.poses)
 
     @property
     def p_value(self) -> float:
@@ -242,15 +242,15 @@ def tested(believed: Observation, correction: Correction, left_out: tuple[int, .
         return correction
     kept = believed.assembly.without(correction.dropped)
     system = seen_system(believed).among(kept)
-    n = len(correction.goals)
-    own = linearised_by(system, correction.goals, np.tile(np.eye(6), (n, 1, 1)))[1]
+    n = len(correction.poses)
+    own = linearised_by(system, correction.poses, np.tile(np.eye(6), (n, 1, 1)))[1]
     own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
     freedom = max(0, correction.test.freedom - jacobian_rank(own))
     p = p_value(correction.test.chi_square, freedom)
     if believed.tails is not None and freedom:
         L = noise_factor(believed)
-        xi = pose.log(pose.inverse(believed.goals) @ correction.goals)
-        _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
+        xi = pose.log(pose.inverse(believed.poses) @ correction.poses)
+        _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
         play = problem_of((believed,)).play_covariance(kept)
         drawn = drawn_chi_squares(believed, L, Jt, play, left_out)
         p = drawn_p_value(drawn, correction.test.chi_square)
@@ -266,7 +266,7 @@ def as_stated(observation: Observation) -> Correction:
 def believed_observation(case: Case, states: States) -> Observation:
     """Views merged, and what is not believed inferred; shared errors and tails of several views are not kept."""
     first = case.observation
-    goals = np.array(first.goals)
+    goals = np.array(first.poses)
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, state in enumerate(states):
@@ -277,22 +277,22 @@ def believed_observation(case: Case, states: States) -> Observation:
         else:
             goals[k] = every.goal
             covariance[k] = every.covariance
-    believed = replace(first, goals=goals, covariance=covariance, seen=np.ones(len(states), dtype=np.bool_))
+    believed = replace(first, poses=goals, covariance=covariance, observed=np.ones(len(states), dtype=np.bool_))
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
     displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))
     if displaced:
         believed = _displaced(believed, displaced)
-    return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
+    return replace(believed, poses=inferred_goals(believed, unknown).goals) if unknown else believed
 
 
 def _displaced(observation: Observation, operations: tuple[int, ...]) -> Observation:
     """With one displacement that some operations share, about their middle."""
     P = np.eye(4)
-    P[:3, 3] = observation.goals[list(operations), :3, 3].mean(axis=0)
+    P[:3, 3] = observation.poses[list(operations), :3, 3].mean(axis=0)
     error = SharedError("view", operations, VIEW, P)
     covariance = np.array(observation.covariance)
-    covariance[list(operations)] += error.added(observation.goals)
+    covariance[list(operations)] += error.added(observation.poses)
     return replace(observation, covariance=covariance, shared=(*observation.shared, error))
 
 

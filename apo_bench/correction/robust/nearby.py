@@ -60,7 +60,7 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
         unlikely = surprise((view,), (belief,), case.model)
         if not says_nothing(belief):
             T, own = reading(view, belief, case.model)
-            apart = pose.log(pose.inverse(without.correction.goals[k]) @ T)
+            apart = pose.log(pose.inverse(without.correction.poses[k]) @ T)
             total = known + own
             unlikely += float(apart @ np.linalg.solve(total, apart)) + log_volume(total) - log_volume(ROOM)
         rated.append((unlikely, belief))

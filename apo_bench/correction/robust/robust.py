@@ -98,7 +98,7 @@ class RobustCorrector:
             views = looked_again(views, look(doubted), observation, model)
             again += doubted
         if best is None:
-            return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
+            return contact_apply(observation) if observation.observed.all() else refused_correction(observation)
         return _report(observation, first or best, search, with_room(best).noisier(), again)
 
     def _model(self, observation: Observation) -> OutlierModel:
@@ -107,7 +107,7 @@ class RobustCorrector:
     def _is_plain(self, observation: Observation) -> bool:
         """One view of each operation, an inlier more likely than not: nothing is searched while the test holds."""
         model = self._model(observation)
-        return bool(observation.seen.all()) and model.surprises[INLIER] < model.surprises[GROSS]
+        return bool(observation.observed.all()) and model.surprises[INLIER] < model.surprises[GROSS]
 
     def _believed(self, observation: Observation, correction: Correction) -> Correction | None:
         """A correction of all as it is stated, if that holds; noise that is larger makes regions larger."""
@@ -154,7 +154,7 @@ def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
     def solve(goals: Array) -> Array | None:
         return hypothesis.goals_at(goals, unknown)
 
-    better = least_crowded(hypothesis.observation, hypothesis.correction.goals, covariance, unknown, solve)
+    better = least_crowded(hypothesis.observation, hypothesis.correction.poses, covariance, unknown, solve)
     return hypothesis if better is None else hypothesis.at(better, unknown)
 
 
@@ -165,14 +165,14 @@ def _report(
     correction = best.correction
     if not best.doubts and not again:
         return replace(correction, sentence=correction.sentence + _unexplained(best))
-    before = largest_gap(observation.assembly, observation.start, observation.goals)
+    before = largest_gap(observation.assembly, observation.start, observation.poses)
     hypotheses = _hypotheses(search, best)
     return replace(
         correction,
         sentence=correction.sentence + _unexplained(best) + _doubts(search, best) + _looks(again),
         covariance=mode_covariance(hypotheses),
         noise_scale=best.scale,
-        gap_before_m=before if observation.seen.all() else np.nan,
+        gap_before_m=before if observation.observed.all() else np.nan,
         test=first.correction.test or correction.test,
         test_after=best.test,
         left_out=best.left_out,
@@ -196,7 +196,7 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
     return tuple(
         Hypothesis(
             (1.0 - UNNAMED) * weight,
-            solved.correction.goals,
+            solved.correction.poses,
             solved.covariance,
             solved.stated,
             solved.left_out,

@@ -53,7 +53,7 @@ Sightings = tuple[tuple[Sighting, ...], ...]
 
 def views_of(observation: Observation, model: OutlierModel | None = None) -> Sightings:
     """What was seen, once at most."""
-    return looked_again(((),) * len(observation.goals), observation, observation, model)
+    return looked_again(((),) * len(observation.poses), observation, observation, model)
 
 
 def looked_again(
@@ -65,15 +65,15 @@ def looked_again(
     before = _before(first)
     grown = list[tuple[Sighting, ...]]()
     for k, old in enumerate(views):
-        if not observation.seen[k]:
+        if not observation.observed[k]:
             grown.append(old)
             continue
-        T = observation.goals[k]
+        T = observation.poses[k]
         ray = None
         if model is not None and model.camera_m is not None:
             to = T[:3, :3].T @ (T[:3, 3] - np.array(model.camera_m))
             ray = to / max(float(np.linalg.norm(to)), 1e-9)
-        others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.seen[i]]
+        others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.observed[i]]
         like = [i for i in others if assembly.solids[mains[i]] is assembly.solids[mains[k]]]
         flips = approximate_symmetries(assembly.solids[mains[k]]).turns
         seen = Sighting(T, observation.covariance[k], flips, before[k], ray, tuple(like or others) if not old else ())
@@ -85,12 +85,12 @@ def _before(first: Observation) -> list[tuple[Array, Array] | None]:
     """Where the part of each operation was before it, and the covariance of that; None if an operation was not seen."""
     now: dict[str, Array | None] = dict.fromkeys(first.start, _EXACT)
     found = list[tuple[Array, Array] | None]()
-    where = (first.start, *placements(first.assembly, first.start, first.goals)) if first.start else ()
+    where = (first.start, *placements(first.assembly, first.start, first.poses)) if first.start else ()
     for k, operation in enumerate(first.assembly.operations):
         C = now.get(operation.main)
         found.append(None if C is None else (where[k][operation.main], C))
         for part in operation.moves:
-            now[part] = first.covariance[k] if first.seen[k] else None
+            now[part] = first.covariance[k] if first.observed[k] else None
     return found
 
 

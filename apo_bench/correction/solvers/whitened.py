@@ -39,7 +39,7 @@ def whitened(observation: Observation) -> Whitened:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return Whitened(observation.goals, noise_factor(observation))
+    return Whitened(observation.poses, noise_factor(observation))
 
 
 def twists_of(L: Array, z: Array) -> Array:
@@ -78,8 +78,8 @@ def noise_factor(observation: Observation) -> Array:
     if not observation.shared:
         return scales(observation.covariance)
     scales(observation.covariance)
-    n = len(observation.goals)
-    joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
+    n = len(observation.poses)
+    joint = joint_covariance(observation.poses, observation.covariance, observation.shared)
     try:
         return np.asarray(np.linalg.cholesky(joint).reshape(n, 6, 6 * n), dtype=np.float64)
     except np.linalg.LinAlgError:

@@ -183,7 +183,7 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
             )
     layout = layout_at(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
     believed = layout.start
-    for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
+    for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
         operation = scenario.assembly.operations[move.step.operation]
         after = after_transfer(operation, move.transfer.T_world_goal, believed)
         depth, other = struck_by(scene, move.transfer, believed, after)
@@ -204,7 +204,7 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     for i, j, yaw in sorted(places):
         x, y = np.add(site.center_m, np.multiply((i, j), site.spread_m))
         layout = layout_at(scenario, x, y, yaw, None, scene.clearance_mm)
-        for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
+        for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
             code = key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and code + part not in known:

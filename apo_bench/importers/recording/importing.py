@@ -96,9 +96,9 @@ def import_recording(
     observation = Observation(
         assembly=assembly,
         start=start,
-        goals=last_seen(assembly, start, goals, seen),
+        poses=last_seen(assembly, start, goals, seen),
         covariance=floored(covariance + _adjustments(operations, assembly)),
-        seen=seen,
+        observed=seen,
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,
     )

@@ -70,5 +70,5 @@ class Belief:
 
 def initial_belief(observation: Observation) -> Belief:
     """What an observation says before any contact is known."""
-    covariance = joint_covariance(observation.goals, observation.covariance, observation.shared)
-    return Belief(observation.assembly, observation.start, observation.goals, covariance)
+    covariance = joint_covariance(observation.poses, observation.covariance, observation.shared)
+    return Belief(observation.assembly, observation.start, observation.poses, covariance)

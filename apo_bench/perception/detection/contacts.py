@@ -119,7 +119,7 @@ class _Around:
         """The pair as a candidate, if it is one."""
         # Body twists of all goals -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
-        if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
+        if slope.reshape(len(slope), -1, 6)[:, ~self.seen.observed].any():
             return
         C = slope @ belief.covariance @ slope.T
         candidate = judged(self.seen, self.rules, a, b, now.poses[b], pair, slope, C)

@@ -58,9 +58,9 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimat
         begin: (n, 4, 4), goals to begin with.
     """
     n = len(begin)
-    C = joint_covariance(seen.goals, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
+    C = joint_covariance(seen.poses, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
     room = C + np.diag(np.tile(_ROOM**2, n))
-    back = pose.inverse(seen.goals[:n])
+    back = pose.inverse(seen.poses[:n])
     goals = begin
     system = equations(assembly, seen.start, begin)
     S = _softness(assembly, seen.play_m)
@@ -77,7 +77,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimat
         new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
         step = np.abs(new - xi).max(initial=0.0)
         xi = new
-        goals = seen.goals[:n] @ pose.exp(xi)
+        goals = seen.poses[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
     # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.

@@ -114,7 +114,7 @@ class _Search:
 
     def endings(self) -> Iterator[_Partial]:
         """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
-        goals = self.seen.goals[self.k : self.k + 1]
+        goals = self.seen.poses[self.k : self.k + 1]
         before = self.history.goals
         beginning = self._with((), goals if before is None else np.concatenate([before, goals]))
         waiting: list[tuple[float, int, _Partial]] = [(0.0, 0, beginning)]
@@ -201,7 +201,7 @@ def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
     """The best of the histories, with how likely it is, and the next best one."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
-    is_uncorrected = placements(seen.assembly, seen.start, seen.goals)
+    is_uncorrected = placements(seen.assembly, seen.start, seen.poses)
     evidence = [
         [
             each

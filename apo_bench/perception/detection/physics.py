@@ -114,7 +114,7 @@ def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
     Where a face above holds it down, it may lean. Of round parts nothing is said.
     """
     solids = at.seen.assembly.solids
-    if not at.seen.seen[at.k] or any(solids[part].rounds for part in at.moves):
+    if not at.seen.observed[at.k] or any(solids[part].rounds for part in at.moves):
         return 0.0
     level = [c for c in taken if abs(c.normal[2]) > _UPRIGHT]
     if not any(c.normal[2] > 0.0 for c in level):

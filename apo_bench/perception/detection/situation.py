@@ -55,7 +55,7 @@ class Situation:
         """A part that was moved and one that stands there, both where something was seen."""
         for a in self.moves:
             for b in self.others:
-                if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.seen[: self.k + 1]].any():
+                if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
                     yield a, b
 
     def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:

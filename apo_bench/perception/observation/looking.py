@@ -63,7 +63,7 @@ class Looks:
         look = observe(self._demonstration, self._later(), self._rng)
         self.left -= 1
         self.reobservations += len(chosen)
-        return replace(look, assembly=self._assembly, seen=look.seen & np.isin(np.arange(n), [*chosen]))
+        return replace(look, assembly=self._assembly, observed=look.observed & np.isin(np.arange(n), [*chosen]))
 
     def _later(self) -> Noise:
         """The noise of a look after the first."""

@@ -60,7 +60,7 @@ def _complaint(demonstration: Demonstration, seen: Any) -> str:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
     if set(seen.start) != set(demonstration.start):
         return "changed which parts have a start pose; pass on `shown.start`"
-    for wrong in np.flatnonzero(~is_rigid(seen.goals)):
+    for wrong in np.flatnonzero(~is_rigid(seen.poses)):
         return (
             f"returned a goal for operation {wrong + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
         )

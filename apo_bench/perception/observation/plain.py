@@ -40,7 +40,7 @@ class Plain:
         return str(getattr(self.function, "__name__", type(self.function).__name__))
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        goals = np.array(self.function(demonstration.goals.copy(), rng), dtype=np.float64)
+        goals = np.array(self.function(demonstration.poses.copy(), rng), dtype=np.float64)
         sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
         stated = floored(np.diag(sigma**2) + demonstration.human_error_covariance)
         return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))

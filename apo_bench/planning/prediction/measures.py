@@ -194,7 +194,7 @@ def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
     """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along."""
     planned = rests = plan.start
     origins = dict[int, tuple[Array, Array]]()
-    for (k, undo), target in zip(plan.schedule, plan.targets, strict=True):
+    for (k, undo), target in zip(plan.schedule, plan.step_poses, strict=True):
         operation = plan.assembly.operations[k]
         alone = replace(plan.assembly, operations=(operation,))
         if undo:

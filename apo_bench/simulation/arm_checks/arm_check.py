@@ -82,7 +82,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     errors, rest, soft = _errors(scene)
     force = _force(arm, scene)
     drawn = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in range(layouts)]
-    of_layouts = [_margins(scene, Plan(scenario.assembly, each.start, each.goals)) for each in drawn]
+    of_layouts = [_margins(scene, Plan(scenario.assembly, each.start, each.poses)) for each in drawn]
     in_reach = [each for each in of_layouts if not np.isnan(each).any()]
     margins = np.min(in_reach or of_layouts, axis=0)
     across = max((each.across_mm for each in errors if each.speed < SPEEDS[-1]), default=0.0)

@@ -73,11 +73,15 @@ def moves(plan: Plan, scene: Scene, spiral: bool = False, acts: tuple[str, ...] 
     before: dict[int, tuple[Array, int | None]] = {}
     """Operation -> where its part was before it, and what had put it there."""
     prepared = []
-    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
         k = step.operation
         operation = plan.assembly.operations[k]
         again = plan.schedule[i + 1 : i + 2] == (Step(k),)
-        if step.undo and again and not arrival_line(nominal_operations(scene.scenario)[k].after, plan.goals[k]).level:
+        if (
+            step.undo
+            and again
+            and not arrival_line(nominal_operations(scene.scenario)[k].after, plan.target_poses[k]).level
+        ):
             continue
         was = put_by.get(operation.main)
         if step.undo:

@@ -252,7 +252,7 @@ def demonstrate(
         after = []
     if not after or has_failed(hands.data):
         # Where the parts are is not known any more, and nobody asks.
-        why, goals, final = "the simulation became unstable", layout.goals, layout.start
+        why, goals, final = "the simulation became unstable", layout.poses, layout.start
     else:
         why = _wrong(scene, layout, after)
         mains = [operation.main for operation in scenario.assembly.operations]
@@ -261,7 +261,7 @@ def demonstrate(
     return Demonstration(
         assembly=scenario.assembly,
         start=layout.start,
-        goals=goals,
+        poses=goals,
         final=final,
         human_error_covariance=human_error_covariance(scenario, human_error),
         code="demonstration_failed" if why else "ok",
@@ -274,13 +274,13 @@ def demonstrate(
 def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) -> list[Snapshot]:
     """Do all operations; what stands where after each, and when all is done."""
     scenario = scene.scenario
-    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
+    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.poses))
     after = []
     with sleeping(scene.shown, True):
         hands.wait(0.05)
         for k in range(len(scenario.assembly)):
             hands.begin(k)
-            target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
+            target = layout.poses[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
             late = error.left if k == len(scenario.assembly) - 1 else ()
             perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
             after.append(snapshot(scene.shown, hands.data, layout.start))
@@ -301,7 +301,7 @@ def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) 
 def _wrong(scene: Scene, layout: Layout, after: list[Snapshot]) -> str:
     """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
     reached = Reached(after=tuple(after[:-1]), final=after[-1])
-    demonstrated = judge(scene.scenario.assembly, reached, layout.goals, scene.criteria).demonstrated
+    demonstrated = judge(scene.scenario.assembly, reached, layout.poses, scene.criteria).demonstrated
     fault = next((fault for fault, there in demonstrated.conditions.items() if there and fault != "pushed"), None)
     if fault is None:
         return ""

@@ -32,7 +32,7 @@ class RobotError:
         if np.array_equal(E, np.eye(4)):
             return plan
         start = {part: E @ T for part, T in plan.start.items()}
-        return replace(plan, start=start, goals=E @ plan.goals, targets=E @ plan.targets)
+        return replace(plan, start=start, target_poses=E @ plan.target_poses, step_poses=E @ plan.step_poses)
 
     def slips(self, operation: int) -> bool:
         """Whether the part of an operation moves in the hand."""

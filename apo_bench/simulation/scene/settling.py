@@ -47,16 +47,16 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
         Bare goals, to be measured by whoever asked; a `Correction` with the status `not_seen` and unknown gaps where an
         operation was not seen; what was seen, from the operation on at which the simulation became unstable.
     """
-    if not observation.seen.all():
-        missing = int(np.argmin(observation.seen))
-        return Correction(observation.goals, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
-    goals = np.array(observation.goals)
+    if not observation.observed.all():
+        missing = int(np.argmin(observation.observed))
+        return Correction(observation.poses, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
+    goals = np.array(observation.poses)
     if not len(goals):
         return goals
     scene = _world(observation)
     data = initial_state(scene, observation.start)
     for k, operation in enumerate(observation.assembly.operations):
-        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.goals[k])
+        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.poses[k])
         try:
             _rest(scene, data)
         except mujoco.FatalError:

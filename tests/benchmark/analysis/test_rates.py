@@ -197,7 +197,9 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     rows = [row("oracle", seed=i) for i in range(4)]
     for level in (0.0, 0.5, 1.0):
         rows += [row(seed=i, success=i < 1, noise_mm=level, noise_deg=level) for i in range(4)]
-        rows += [row("paper", seed=i, success=None if i == 3 else True, noise_mm=level, noise_deg=level) for i in range(4)]
+        rows += [
+            row("paper", seed=i, success=None if i == 3 else True, noise_mm=level, noise_deg=level) for i in range(4)
+        ]
     made = report(write(tmp_path / "run", rows))
     table = list(csv.DictReader(made.tables["cells"].open()))
     assert list(table[0])[:9] == [

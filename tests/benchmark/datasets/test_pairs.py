@@ -48,9 +48,9 @@ def test_one_demonstration_is_seen_as_the_noise_model_sees_it(noise: str | type)
         Demonstration(scenario.assembly, start, layouts.goals[0], {}, human_error_scale),
         np.random.default_rng(2),
     )
-    assert many.goals[0].tobytes() == one.goals.tobytes()
+    assert many.goals[0].tobytes() == one.poses.tobytes()
     assert many.covariance[0].tobytes() == one.covariance.tobytes()
-    assert many.seen[0].tobytes() == one.seen.tobytes()
+    assert many.seen[0].tobytes() == one.observed.tobytes()
 
 
 @pytest.mark.parametrize("noise", KINDS)

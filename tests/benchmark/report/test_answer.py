@@ -101,7 +101,9 @@ def test_levels_that_do_not_reach_one_half_say_so(h: float, words: str) -> None:
 
 def test_of_several_settings_the_worst_curve_is_told() -> None:
     def at(scenario: str, h: float) -> list[dict[str, Any]]:
-        return [row("contact", i, x < h, noise_mm=x, noise_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
+        return [
+            row("contact", i, x < h, noise_mm=x, noise_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)
+        ]
 
     assert "In each of 2 settings its curve over the level stays above one half up" in said(at("a", 9.0) + at("b", 9.0))
     worst = "In the worst of 2 settings its curve over the level falls to one half at level 2 (surely: 1 to 4)."

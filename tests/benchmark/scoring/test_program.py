@@ -28,7 +28,7 @@ TOWER = scenes.stick_in_tower()
 SEEN = scenes.seen(TOWER, TOWER.goals)
 ANSWER = """
 request = json.loads(sys.stdin.readline())
-print(json.dumps({"goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
+print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
 """
 ENDLESS = """
 import subprocess, sys
@@ -51,7 +51,7 @@ def test_a_program_finds_a_path_and_a_language_in_its_environment_and_nothing_el
     monkeypatch.setenv("LANG", "C.UTF-8")
     write = "import json, os, sys\nopen('found', 'w').write(json.dumps(dict(os.environ)))\n"
     goals = started(tmp_path, write + ANSWER)(SEEN)
-    assert np.allclose(goals, SEEN.goals)
+    assert np.allclose(goals, SEEN.poses)
     found = json.loads((tmp_path / "found").read_text())
     assert found["PATH"] == os.environ["PATH"]
     assert found["LANG"] == "C.UTF-8"
@@ -85,7 +85,7 @@ def test_a_program_without_end_is_ended_with_its_children(
 
 def test_a_program_may_write_as_much_as_is_allowed_before_it_reads(tmp_path: Path) -> None:
     spaces = f"import json, sys\nsys.stdout.write(' ' * {LARGEST_ANSWER_BYTES - 100_000})\n"
-    assert np.allclose(started(tmp_path, spaces + ANSWER)(SEEN), SEEN.goals)
+    assert np.allclose(started(tmp_path, spaces + ANSWER)(SEEN), SEEN.poses)
     with pytest.raises(InputError, match="exit code 3"):
         started(tmp_path, "raise SystemExit(3)")(SEEN)
     with pytest.raises(InputError, match="wrote no answer"):
@@ -113,7 +113,7 @@ def requests(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 
 def is_uncorrected(request: dict[str, Any]) -> dict[str, Any]:
     keys = ("position_mm", "quaternion_wxyz")
-    return {"id": request["id"], "goals": [{key: o[key] for key in keys} for o in request["operations"]]}
+    return {"id": request["id"], "poses": [{key: o[key] for key in keys} for o in request["operations"]]}
 
 
 def lines(answers: list[Any]) -> str:
@@ -128,7 +128,7 @@ def score(folder: Path, text: str) -> int:
 
 
 def _one_pose_less(answers: list[Any]) -> str:
-    return lines([answers[0], {**answers[1], "goals": answers[1]["goals"][1:]}])
+    return lines([answers[0], {**answers[1], "poses": answers[1]["poses"][1:]}])
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def _one_pose_less(answers: list[Any]) -> str:
         (_one_pose_less, "2 goals are needed, 1 were given"),
         (lambda answers: lines([answers[0], answers[0], answers[1]]), "line 2: a second answer for"),
         (
-            lambda answers: lines([{**answers[0], "goals": "left"}, answers[1]]),
+            lambda answers: lines([{**answers[0], "poses": "left"}, answers[1]]),
             "line 1, goal 1: an object",
         ),
         (lambda answers: lines([{"id": answers[0]["id"]}, answers[1]]), "the key 'goals' is missing"),
@@ -167,7 +167,7 @@ def test_a_file_of_answers_may_be_large_and_answer_more_than_is_asked(
     tmp_path: Path, requests: list[dict[str, Any]]
 ) -> None:
     answers = [is_uncorrected(request) for request in requests]
-    others = [{**answers[0], "id": f"another track {i}", "goals": answers[0]["goals"] * 50} for i in range(400)]
+    others = [{**answers[0], "id": f"another track {i}", "poses": answers[0]["poses"] * 50} for i in range(400)]
     text = lines([*others, *answers]).rstrip("\n")
     assert len(text) > 2_000_000
     assert score(tmp_path, text) == 0

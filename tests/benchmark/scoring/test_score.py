@@ -31,7 +31,7 @@ FEWER = {"long": 80, "round": 80, "generated": 80}
 AS_SEEN = """
 import json, sys
 request = json.loads(sys.stdin.readline())
-print(json.dumps({"goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
+print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
 """
 
 
@@ -72,7 +72,7 @@ def test_a_program_and_a_file_of_answers_score_as_the_same_corrector_in_python(s
     assert len(asked) == 2
     assert all(request["faces"] and "scenario" not in request for request in asked)
     goals = [
-        {"id": r["id"], "goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in r["operations"]]}
+        {"id": r["id"], "poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in r["operations"]]}
         for r in asked
     ]
     (small / "goals.jsonl").write_text("".join(json.dumps(line) + "\n" for line in goals))

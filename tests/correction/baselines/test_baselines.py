@@ -29,7 +29,7 @@ def noisy(name: str, seed: int = 0) -> Observation:
 
 def length(seen: Observation, goals: Array) -> float:
     """|z| of goals, in standard deviations."""
-    return float(np.linalg.norm(pose.log(pose.inverse(seen.goals) @ goals) / SIGMA))
+    return float(np.linalg.norm(pose.log(pose.inverse(seen.poses) @ goals) / SIGMA))
 
 
 @pytest.mark.numeric
@@ -41,15 +41,15 @@ def test_what_is_consistent_stays_as_it_is(method: str, within: float, name: str
     made = correct(scenes.seen(built, built.goals), method)
     assert made.ok
     assert made.gap_after_m < 1e-6
-    assert np.abs(made.goals - built.goals).max() < within
+    assert np.abs(made.poses - built.goals).max() < within
 
 
 @pytest.mark.parametrize("method", [*STATIC, settle])
 def test_an_operation_that_was_not_seen_is_refused(method: Any) -> None:
     seen = noisy("bridge")
-    made = correct(replace(seen, seen=np.array([True, False, True])), method)
+    made = correct(replace(seen, observed=np.array([True, False, True])), method)
     assert (made.status, made.sentence) == ("not_seen", "operation 2 was not seen")
-    assert np.array_equal(made.goals, seen.goals)
+    assert np.array_equal(made.poses, seen.poses)
 
 
 @pytest.mark.parametrize("method", [*STATIC, settle])
@@ -59,7 +59,7 @@ def test_no_operations_make_no_goals(method: Any) -> None:
     seen = Observation(none.assembly, none.start, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)), np.zeros(0, dtype=np.bool_))
     made = correct(seen, method)
     assert made.ok
-    assert made.goals.shape == (0, 4, 4)
+    assert made.poses.shape == (0, 4, 4)
 
 
 @pytest.mark.parametrize("method", STATIC)
@@ -68,7 +68,7 @@ def test_a_part_without_contacts_stays_where_it_was_seen(method: str) -> None:
     alone = Assembly(seen.assembly.solids, tuple(Operation(o.main) for o in seen.assembly.operations), frozenset())
     made = correct(replace(seen, assembly=alone), method)
     assert made.ok
-    assert np.array_equal(made.goals, seen.goals)
+    assert np.array_equal(made.poses, seen.poses)
 
 
 @pytest.mark.parametrize("method", STATIC)
@@ -88,7 +88,7 @@ def test_what_was_seen_well_moves_less(method: str) -> None:
     for sure, other in ((0, 1), (1, 0)):
         covariance = np.array(seen.covariance)
         covariance[sure] *= 1e-4
-        moved = correct(replace(seen, covariance=covariance), method).goals[:, 0, 3] - goals[:, 0, 3]
+        moved = correct(replace(seen, covariance=covariance), method).poses[:, 0, 3] - goals[:, 0, 3]
         assert abs(moved[sure]) < 0.1e-3
         assert abs(moved[other]) == pytest.approx(2e-3, abs=0.1e-3)
 
@@ -97,16 +97,16 @@ def test_what_was_seen_well_moves_less(method: str) -> None:
 def test_snap_never_looks_back(name: str) -> None:
     """The goals of the first operations are those of a demonstration that ended there."""
     seen = noisy(name)
-    goals = correct(seen, "snap").goals
+    goals = correct(seen, "snap").poses
     for n in range(1, len(goals)):
         early = replace(
             seen,
             assembly=seen.assembly.first(n),
-            goals=seen.goals[:n],
+            poses=seen.poses[:n],
             covariance=seen.covariance[:n],
-            seen=seen.seen[:n],
+            observed=seen.observed[:n],
         )
-        assert np.allclose(correct(early, "snap").goals, goals[:n], atol=1e-12)
+        assert np.allclose(correct(early, "snap").poses, goals[:n], atol=1e-12)
 
 
 def test_snap_leaves_the_gap_that_earlier_errors_make() -> None:
@@ -115,20 +115,20 @@ def test_snap_leaves_the_gap_that_earlier_errors_make() -> None:
     goals = built.goals.copy()
     goals[1, 1, 3] += 2e-3
     made = correct(scenes.seen(built, goals), "snap")
-    assert np.array_equal(made.goals[:2], goals[:2])
+    assert np.array_equal(made.poses[:2], goals[:2])
     assert made.ok
     assert made.sentence.startswith("every part was put onto its newest support; the largest gap left is ")
     assert made.gap_after_m > 0.5e-3
-    assert made.goals[2, 1, 3] == pytest.approx(1e-3, abs=1e-6)
+    assert made.poses[2, 1, 3] == pytest.approx(1e-3, abs=1e-6)
 
 
 def test_snap_takes_the_most_likely_of_all_poses_that_fit() -> None:
     """One goal, correlated noise: the limit of ever harder contacts."""
     seen = noisy("bridge")
     A = np.random.default_rng(1).standard_normal((6, 6)) * SIGMA[:, None]
-    first = Observation(seen.assembly.first(1), seen.start, seen.goals[:1], (A @ A.T)[None], seen.seen[:1])
+    first = Observation(seen.assembly.first(1), seen.start, seen.poses[:1], (A @ A.T)[None], seen.observed[:1])
     hard = least_squares(first, contact_m=1e-7)
-    assert np.allclose(correct(first, "snap").goals, hard.goals, atol=1e-7)
+    assert np.allclose(correct(first, "snap").poses, hard.poses, atol=1e-7)
 
 
 @pytest.mark.parametrize("contact_m", [1e-5])
@@ -138,7 +138,7 @@ def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -
     seen = noisy(name)
     truth = scenes.ALL[name]().goals
     made = correct(seen, partial(least_squares, contact_m=contact_m))
-    assert made.gap_after_m**2 / contact_m**2 + length(seen, made.goals) ** 2 <= length(seen, truth) ** 2 * (1 + 1e-9)
+    assert made.gap_after_m**2 / contact_m**2 + length(seen, made.poses) ** 2 <= length(seen, truth) ** 2 * (1 + 1e-9)
     assert made.gap_after_m < 0.5 * contact_m
 
 
@@ -146,7 +146,7 @@ def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -
 def test_the_gradient_of_the_penalty_is_that_of_differences(name: str) -> None:
     seen = noisy(name)
     down = loss(seen)
-    z = np.random.default_rng(2).standard_normal(6 * len(seen.goals)) * 0.3
+    z = np.random.default_rng(2).standard_normal(6 * len(seen.poses)) * 0.3
     h = 1e-6
     _, gradient = down(z)
     differences = [(down(z + h * e)[0] - down(z - h * e)[0]) / (2 * h) for e in np.eye(len(z))]
@@ -174,7 +174,7 @@ def test_the_descent_goes_down_and_closes_most_of_the_gap(name: str) -> None:
     seen = noisy(name)
     made = correct(seen, "penalty")
     down = loss(seen)
-    z = (pose.log(pose.inverse(seen.goals) @ made.goals) / SIGMA).ravel()
+    z = (pose.log(pose.inverse(seen.poses) @ made.poses) / SIGMA).ravel()
     assert down(z)[0] < 0.05 * down(np.zeros_like(z))[0]
     assert made.gap_after_m < 0.05 * made.gap_before_m
 
@@ -186,15 +186,15 @@ def test_parts_that_lie_right_settle_by_their_play_and_no_more(name: str) -> Non
     seen = scenes.seen(built, built.goals)
     made = correct(seen, settle)
     assert made.ok
-    assert np.linalg.norm(made.goals[:, :3, 3] - built.goals[:, :3, 3], axis=1).max() < 0.6e-3
-    assert np.array_equal(correct(seen, settle).goals, made.goals)
+    assert np.linalg.norm(made.poses[:, :3, 3] - built.goals[:, :3, 3], axis=1).max() < 0.6e-3
+    assert np.array_equal(correct(seen, settle).poses, made.poses)
 
 
 def test_a_stick_sinks_by_the_play_that_is_stated() -> None:
     play_mm = 1.0
     built = scenes.stick_on_castles()
     made = correct(replace(scenes.seen(built, built.goals), play_m=play_mm * 1e-3), settle)
-    assert made.goals[2, 2, 3] == pytest.approx(built.goals[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)
+    assert made.poses[2, 2, 3] == pytest.approx(built.goals[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)
 
 
 @pytest.mark.parametrize("height_mm", [-3.0, 3.0])

@@ -103,9 +103,9 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
         assert found.gap_after_m < NOTHING_M
-        assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.goals) > 3e-4
-        assert largest_gap(seen.assembly, seen.start, found.goals) < NOTHING_M
-        assert is_rigid(found.goals).all()
+        assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses) > 3e-4
+        assert largest_gap(seen.assembly, seen.start, found.poses) < NOTHING_M
+        assert is_rigid(found.poses).all()
 
 
 def test_the_trace_ends_at_rest() -> None:
@@ -123,7 +123,7 @@ def test_the_world_frame_does_not_matter() -> None:
     W = pose.at((0.11, -0.02, 0.0), (0.0, 0.0, 27.0))
     moved = scenes.turned(scene, W)
     there = paper(scenes.seen(moved, W @ goals))
-    assert_allclose(there.goals, W @ paper(scenes.seen(scene, goals)).goals, atol=1e-9)
+    assert_allclose(there.poses, W @ paper(scenes.seen(scene, goals)).poses, atol=1e-9)
 
 
 def drift(scene: scenes.Scene, seen: Array) -> float:
@@ -172,9 +172,9 @@ def test_contacts_that_contradict_each_other_are_inconsistent() -> None:
 def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
     scene = scenes.stick_on_castles()
     goals = scenes.noisy(scene.goals, np.random.default_rng(0), 1.0, 1.0)
-    found = paper(replace(scenes.seen(scene, goals), seen=np.array([True, False, True])))
+    found = paper(replace(scenes.seen(scene, goals), observed=np.array([True, False, True])))
     assert (found.status, found.sentence, found.freed) == ("not_seen", "operation 2 was not seen", ())
-    assert_array_equal(found.goals, goals)
+    assert_array_equal(found.poses, goals)
     assert found.gap_before_m == found.gap_after_m == largest_gap(scene.assembly, scene.start, goals)
 
 
@@ -196,7 +196,7 @@ def test_numbers_that_overflow_are_not_finite() -> None:
     with np.errstate(all="ignore"):
         found = paper(scenes.seen(scene, goals))
     assert found.status == "not_finite"
-    assert_array_equal(found.goals, goals)
+    assert_array_equal(found.poses, goals)
 
 
 # What is freed, and what is only settled
@@ -222,7 +222,7 @@ def test_a_careless_human_frees_the_candidates_of_the_paper(
     assert found.gap_before_m == pytest.approx(size * 1e-3)
     assert found.gap_after_m < NOTHING_M
     others = [k for k in range(len(goals)) if k not in found.freed]
-    assert_array_equal(found.goals[others], goals[others])
+    assert_array_equal(found.poses[others], goals[others])
 
 
 def tilted(scene: scenes.Scene, k: int, mm: float, deg: float) -> Array:
@@ -238,9 +238,9 @@ def test_a_goal_that_is_no_candidate_is_settled_for_what_it_makes() -> None:
     goals[1:3, 1, 3] += 0.003
     found = paper(scenes.seen(scene, goals))
     assert found.freed == (4, 2, 1, 0)
-    assert_allclose(found.goals[3, 2], [0, 0, 1, 0.025], atol=1e-9)
-    assert_allclose(found.goals[3, :2, 3], goals[3, :2, 3], atol=1e-4)
-    assert np.degrees(np.arctan2(*found.goals[3, [1, 0], 0])) == pytest.approx(3.0, abs=1e-3)
+    assert_allclose(found.poses[3, 2], [0, 0, 1, 0.025], atol=1e-9)
+    assert_allclose(found.poses[3, :2, 3], goals[3, :2, 3], atol=1e-4)
+    assert np.degrees(np.arctan2(*found.poses[3, [1, 0], 0])) == pytest.approx(3.0, abs=1e-3)
 
 
 def test_a_tilt_above_the_threshold_makes_a_candidate() -> None:
@@ -269,23 +269,23 @@ def noisy_tower() -> Observation:
 
 def test_correct_by_name_by_path_and_by_object() -> None:
     seen = noisy_tower()
-    goals = paper(seen).goals
+    goals = paper(seen).poses
     for name in ("paper", "apo_bench.correction.baselines.paper:paper", paper):
-        assert_array_equal(correct(seen, name).goals, goals)
+        assert_array_equal(correct(seen, name).poses, goals)
 
 
 def test_bare_goals_are_measured_and_wrapped() -> None:
     seen = noisy_tower()
-    goals = paper(seen).goals
+    goals = paper(seen).poses
     found = correct(seen, lambda observation: goals)
     assert (found.status, found.freed, found.rank) == ("converged", (2, 1, 0), 13)
-    assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.goals)
+    assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses)
     assert found.gap_after_m < NOTHING_M
-    assert correct(seen, lambda observation: observation.goals).freed == ()
+    assert correct(seen, lambda observation: observation.poses).freed == ()
 
 
 def reflected(seen: Observation) -> Array:
-    goals = seen.goals.copy()
+    goals = seen.poses.copy()
     goals[1, :3, 2] *= -1
     return goals
 
@@ -298,9 +298,9 @@ def steps(spelled: str) -> tuple[Step, ...]:
 def scheduled(spelled: str, mirrored: bool = False) -> Callable[[Observation], Correction]:
     def scheduling(seen: Observation) -> Correction:
         made = paper(seen)
-        targets = made.goals[[min(k, len(made.goals) - 1) for k, _ in steps(spelled)]]
+        targets = made.poses[[min(k, len(made.poses) - 1) for k, _ in steps(spelled)]]
         targets[-1] = np.diag([-1.0, 1.0, 1.0, 1.0]) if mirrored else targets[-1]
-        return replace(made, schedule=steps(spelled), targets=targets)
+        return replace(made, schedule=steps(spelled), step_poses=targets)
 
     return scheduling
 
@@ -308,8 +308,8 @@ def scheduled(spelled: str, mirrored: bool = False) -> Callable[[Observation], C
 def test_a_schedule_that_makes_sense_is_passed_on() -> None:
     found = correct(noisy_tower(), scheduled("1 2 -2 2 3"))
     assert found.schedule == steps("1 2 -2 2 3")
-    assert found.targets is not None
-    assert found.targets.shape == (5, 4, 4)
+    assert found.step_poses is not None
+    assert found.step_poses.shape == (5, 4, 4)
 
 
 def returning(**changed: Any) -> Callable[[Observation], Correction]:
@@ -349,7 +349,7 @@ def other_status(seen: Observation) -> Correction:
         ("papr", "unknown corrector 'papr'; did you mean 'paper'"),
         ("no_such_module:f", "cannot be imported"),
         (lambda seen: None, "returned None; return a Correction or goals of shape (3, 4, 4)"),
-        (lambda seen: seen.goals[:2], "returned an array of shape (2, 4, 4)"),
+        (lambda seen: seen.poses[:2], "returned an array of shape (2, 4, 4)"),
         (reflected, "the corrector 'reflected' returned a goal for operation 2 that is not a rigid pose"),
         (other_status, "returned the status 'fine'; return one of converged, not_seen"),
         (scheduled("1 2"), "returned a schedule that leaves operation 3 undone; do operations in order"),
@@ -357,7 +357,7 @@ def other_status(seen: Observation) -> Correction:
         (scheduled("1 -2 2 3"), "returned a schedule that undoes operation 2, which is not done"),
         (scheduled("1 2 3 -2"), "returned a schedule that undoes operation 2 before operation 3"),
         (scheduled("1 2 3", mirrored=True), "returned a target for step 3 of its schedule that is not a rigid pose"),
-        (lambda seen: replace(paper(seen), targets=np.zeros((0, 4, 4))), "returned targets and no schedule"),
+        (lambda seen: replace(paper(seen), step_poses=np.zeros((0, 4, 4))), "returned targets and no schedule"),
     ],
 )
 def test_what_correct_refuses(given: object, message: str) -> None:

@@ -69,17 +69,17 @@ def test_the_sets_of_the_paper_whatever_the_size_of_the_error(name: str, size: f
 def test_the_oldest_goals_stay_and_all_contacts_hold(name: str) -> None:
     scene, goals = scenes.human_error(name, 3.0)
     found = paper_track(scenes.seen(scene, goals))
-    assert largest_gap(scene.assembly, scene.start, found.goals) < 1e-8
+    assert largest_gap(scene.assembly, scene.start, found.poses) < 1e-8
     assert found.gap_before_m == pytest.approx(3e-3)
     kept = [k for k in range(len(goals)) if k not in found.freed]
-    assert_array_equal(found.goals[kept], goals[kept])
+    assert_array_equal(found.poses[kept], goals[kept])
 
 
 def walked(found: Correction) -> dict[int, Array]:
     """What is done at the end, with the motion parameters in force; every undo takes back what was done."""
-    assert found.targets is not None
+    assert found.step_poses is not None
     done: dict[int, Array] = {}
-    for (k, undo), T in zip(found.schedule, found.targets, strict=True):
+    for (k, undo), T in zip(found.schedule, found.step_poses, strict=True):
         if undo:
             assert_array_equal(done.pop(k), T)
         else:
@@ -98,8 +98,8 @@ def test_the_schedule_ends_at_the_goals(name: str, level: float) -> None:
         assert found.ok
         done = walked(found)
         assert sorted(done) == list(range(len(goals)))
-        assert_array_equal(np.array([done[k] for k in sorted(done)]), found.goals)
-        assert is_rigid(found.goals).all()
+        assert_array_equal(np.array([done[k] for k in sorted(done)]), found.poses)
+        assert is_rigid(found.poses).all()
 
 
 def test_before_an_operation_is_seen_it_changes_nothing() -> None:
@@ -109,13 +109,17 @@ def test_before_an_operation_is_seen_it_changes_nothing() -> None:
     seen = scenes.seen(scene, goals)
     n = 4
     early = replace(
-        seen, assembly=scene.assembly.first(n), goals=goals[:n], covariance=seen.covariance[:n], seen=seen.seen[:n]
+        seen,
+        assembly=scene.assembly.first(n),
+        poses=goals[:n],
+        covariance=seen.covariance[:n],
+        observed=seen.observed[:n],
     )
     whole = paper_track(seen)
     part = paper_track(early)
     assert part.schedule == whole.schedule[: len(part.schedule)]
-    assert whole.targets is not None
-    assert_array_equal(part.targets, whole.targets[: len(part.schedule)])
+    assert whole.step_poses is not None
+    assert_array_equal(part.step_poses, whole.step_poses[: len(part.schedule)])
     assert part.tried == tuple(one for one in whole.tried if one.step < n)
 
 
@@ -124,7 +128,7 @@ def test_a_careful_human_is_followed_without_taking_apart() -> None:
         scene = scenes.ALL[name]()
         found = paper_track(scenes.seen(scene, scene.goals))
         assert (found.tried, found.freed, found.schedule) == ((), (), once_each(len(scene.goals)))
-        assert_array_equal(found.goals, scene.goals)
+        assert_array_equal(found.poses, scene.goals)
 
 
 def test_no_set_suffices() -> None:
@@ -133,8 +137,8 @@ def test_no_set_suffices() -> None:
     assert [one.free for one in found.tried] == [(0,)]
     assert found.tried[0].gap_m == pytest.approx(0.005)
     assert found.gap_after_m == found.gap_before_m == pytest.approx(0.008)
-    assert (found.schedule, found.targets, found.freed) == ((), None, ())
-    assert_array_equal(found.goals, contradiction().goals)
+    assert (found.schedule, found.step_poses, found.freed) == ((), None, ())
+    assert_array_equal(found.poses, contradiction().poses)
 
 
 def test_a_tighter_threshold_never_reaches_back_less() -> None:

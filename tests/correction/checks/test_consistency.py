@@ -88,7 +88,7 @@ def test_chi_square_is_the_squared_length_of_the_correction() -> None:
     for seed in range(2):
         seen = look(scene, seed)
         made = correct(seen, "contact")
-        xi = pose.log(pose.inverse(seen.goals) @ made.goals)
+        xi = pose.log(pose.inverse(seen.poses) @ made.poses)
         length = np.einsum("ni,nij,nj->", xi, np.linalg.inv(seen.covariance), xi)
         assert consistency_of(made).chi_square == pytest.approx(length, rel=1e-9)
         assert consistency_of(made).freedom == made.rank == 13
@@ -149,7 +149,7 @@ def test_what_to_do_if_the_test_fails(kind: str) -> None:
     assert drop.test_after is not None
     assert drop.test_after.passes
     assert apply.dropped == warn.dropped == refuse.dropped == ()
-    assert_allclose(warn.goals, apply.goals, rtol=0, atol=0)
+    assert_allclose(warn.poses, apply.poses, rtol=0, atol=0)
     assert not consistency_of(drop).passes
     assert drop.covariance is not None
     assert warn.covariance is None or kind == "not redundant"
@@ -164,7 +164,7 @@ def test_what_is_left_out_no_longer_counts() -> None:
         replace(o, contacts=tuple(c for c in o.contacts if str(c) != off(contact))) for o in seen.assembly.operations
     )
     right = correct(replace(seen, assembly=replace(seen.assembly, operations=tuple(kept))), "contact")
-    assert_allclose(made.goals, right.goals, rtol=0, atol=1e-9)
+    assert_allclose(made.poses, right.poses, rtol=0, atol=1e-9)
     assert made.rank == right.rank
     assert made.gap_after_m > 5e-3
 
@@ -201,7 +201,7 @@ def test_of_very_many_relations_the_likeliest_are_tried() -> None:
 def test_play_leaves_the_goals_as_they_are() -> None:
     seen = look(scenes.stick_in_tower(), 0)
     loose = replace(seen, play_m=0.25e-3)
-    assert_allclose(correct(loose, "contact").goals, correct(seen, "contact").goals, rtol=0, atol=0)
+    assert_allclose(correct(loose, "contact").poses, correct(seen, "contact").poses, rtol=0, atol=0)
     assert consistency_of(correct(loose, "contact")).chi_square < consistency_of(correct(seen, "contact")).chi_square
 
 

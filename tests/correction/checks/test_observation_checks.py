@@ -44,8 +44,8 @@ def lopsided(covariance: Array) -> None:
 
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "stretched": (lambda: edited("goals", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
-    "far": (lambda: edited("goals", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
+    "stretched": (lambda: edited("poses", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
+    "far": (lambda: edited("poses", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
     "lopsided": (
         lambda: edited("covariance", lopsided),
         "the covariance of operation 2 in the observation is not symm",
@@ -57,7 +57,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-@pytest.mark.parametrize("corrector", ["contact", lambda seen: seen.goals])
+@pytest.mark.parametrize("corrector", ["contact", lambda seen: seen.poses])
 def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, corrector: Any) -> None:
     make, message = WRONG[case]
     with pytest.raises(InputError) as refused:
@@ -74,17 +74,17 @@ def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
     with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the goal of operation 2 in observation 2 is not a rigid pose"):
-        correct_many([seen(), edited("goals", stretched)])
+        correct_many([seen(), edited("poses", stretched)])
 
 
 def lying(seen: Observation, **changed: Any) -> Correction:
-    made = Correction(seen.goals, "converged", "all is well", (), 0.0, 0.0, 0)
+    made = Correction(seen.poses, "converged", "all is well", (), 0.0, 0.0, 0)
     return replace(made, **changed)
 
 
 def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     one = seen()
-    open_m = largest_gap(one.assembly, one.start, one.goals)
+    open_m = largest_gap(one.assembly, one.start, one.poses)
     assert open_m > 1e-3
     for claimed in (0.0, float("nan"), -1.0):
         made = correct(one, lambda seen, claimed=claimed: lying(seen, gap_after_m=claimed))
@@ -112,7 +112,7 @@ def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message
 
 def test_poses_far_beyond_everything_are_refused() -> None:
     def away(seen: Observation) -> Array:
-        goals = np.array(seen.goals)
+        goals = np.array(seen.poses)
         goals[1, 0, 3] = 1e200
         return goals
 

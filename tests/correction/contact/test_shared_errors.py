@@ -28,8 +28,8 @@ from apo_bench.viz.explain_text import sentences
 def shown(name: str, seed: int) -> Demonstration:
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
-    n = len(layout.goals)
-    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    n = len(layout.poses)
+    return Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
 
 
 def seen(model: str, name: str = "pocket_table", seed: int = 0, level: float = 2.0) -> tuple[Observation, np.ndarray]:
@@ -37,7 +37,7 @@ def seen(model: str, name: str = "pocket_table", seed: int = 0, level: float = 2
     made = make_noise(model, NoiseLevel(level, level))(
         demonstration.assembly, demonstration, np.random.default_rng(seed)
     )
-    return made, np.array(demonstration.goals)
+    return made, np.array(demonstration.poses)
 
 
 def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
@@ -49,7 +49,7 @@ def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
         for given, errors in ((observation, joint), (replace(observation, shared=()), alone)):
             made = correct(given, "contact")
             assert made.ok
-            errors.append(np.linalg.norm(made.goals[:, :3, 3] - truth[:, :3, 3], axis=1).max())
+            errors.append(np.linalg.norm(made.poses[:, :3, 3] - truth[:, :3, 3], axis=1).max())
     assert np.mean(joint) < 0.15 * np.mean(alone)
 
 
@@ -89,11 +89,11 @@ def test_the_test_and_the_regions_are_those_of_the_tails() -> None:
 def test_a_shared_error_of_none_of_the_size_changes_nothing() -> None:
     observation, _ = seen("isotropic")
     tiny = SharedError(
-        "camera", tuple(range(len(observation.goals))), np.diag(np.repeat([1e-9, 1e-9], 3) ** 2), np.eye(4)
+        "camera", tuple(range(len(observation.poses))), np.diag(np.repeat([1e-9, 1e-9], 3) ** 2), np.eye(4)
     )
     one = correct(observation, ContactCorrector())
     other = correct(replace(observation, shared=(tiny,)), ContactCorrector())
-    assert_allclose(other.goals, one.goals, atol=1e-9)
+    assert_allclose(other.poses, one.poses, atol=1e-9)
     assert_allclose(other.covariance, one.covariance, rtol=1e-5, atol=1e-16)
     assert other.test.chi_square == pytest.approx(one.test.chi_square, rel=1e-6)
 
@@ -103,10 +103,10 @@ def test_what_is_known_of_the_camera_is_said() -> None:
     square = []
     for seed in range(15):
         observation, truth = seen("bias-view", seed=seed)
-        found = explain(observation, correct(observation, "contact").goals)
+        found = explain(observation, correct(observation, "contact").poses)
         (one,) = found.shared
         P = one.error.frame
-        true = pose.log(pose.inverse(P) @ observation.goals[0] @ pose.inverse(truth[0]) @ P)
+        true = pose.log(pose.inverse(P) @ observation.poses[0] @ pose.inverse(truth[0]) @ P)
         off = one.twist - true
         square.append(off @ np.linalg.solve(one.covariance + np.diag(np.repeat([1e-4, 2e-3], 3) ** 2), off))
     assert np.mean(square) < 12.0
@@ -126,14 +126,14 @@ def test_an_outlier_beside_an_error_of_the_view_is_left_out_and_the_rest_solved_
     for seed in range(2):
         observation, truth = seen("bias-view", seed=seed)
         (camera,) = observation.shared
-        goals = np.array(observation.goals)
+        goals = np.array(observation.poses)
         stated = np.array(observation.covariance)
         goals[1] = goals[1] @ pose.at((0.12, -0.07, 0.05), (40.0, -20.0, 60.0))
-        stated[1] += camera.added(goals)[1] - camera.added(observation.goals)[1]
-        wrong = replace(observation, goals=goals, covariance=stated)
+        stated[1] += camera.added(goals)[1] - camera.added(observation.poses)[1]
+        wrong = replace(observation, poses=goals, covariance=stated)
         others = [k for k in range(len(goals)) if k != 1]
         for given, errors in ((wrong, joint), (replace(wrong, shared=()), alone)):
             made = correct(given, "contact-robust")
             assert made.ok
-            errors.append(np.linalg.norm(made.goals[others, :3, 3] - truth[others, :3, 3], axis=1).max())
+            errors.append(np.linalg.norm(made.poses[others, :3, 3] - truth[others, :3, 3], axis=1).max())
     assert np.mean(joint) < 0.3 * np.mean(alone)

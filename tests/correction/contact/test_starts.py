@@ -18,13 +18,13 @@ from tests.correction.robust.test_robust import fixed_error_mm, look, shown
 def turned(name, k, turn, seed=0):
     """Operation k seen turned in its own frame, [degrees]."""
     observation = look(name, seed)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[k] = goals[k] @ pose.at((0.0, 0.0, 0.0), turn)
-    return replace(observation, goals=goals)
+    return replace(observation, poses=goals)
 
 
 def length(observation, goals):
-    return np.linalg.norm(correction_to(observation.goals, scales(observation.covariance), goals))
+    return np.linalg.norm(correction_to(observation.poses, scales(observation.covariance), goals))
 
 
 @pytest.mark.parametrize(("name", "k"), [("block_on_block", 1), ("pocket_table", 3)])
@@ -45,8 +45,8 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
     for seen in (look(name, 3, 25.0), look(name, 3, 40.0)):
         found = correct(seen, "contact")
         assert found.ok
-        assert length(seen, found.goals) <= length(seen, layout.goals)
-        assert largest_gap(seen.assembly, seen.start, found.goals) <= seen.gap_m
+        assert length(seen, found.poses) <= length(seen, layout.poses)
+        assert largest_gap(seen.assembly, seen.start, found.poses) <= seen.gap_m
 
 
 def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
@@ -54,7 +54,7 @@ def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby()
         seen = look(name, 1, 4.0)
         one = correct(seen, "contact")
         other = correct(seen, ContactCorrector(elsewhere=False))
-        assert one.goals.tolist() == other.goals.tolist()
+        assert one.poses.tolist() == other.poses.tolist()
         assert one.sentence == other.sentence
 
 
@@ -62,14 +62,14 @@ def test_where_contacts_bend_newton_ends_where_small_steps_would():
     """A cube seen upside down: each turn of it is about as far, so small steps shrink by a percent only."""
     seen = turned("block_on_block", 1, [180, 0, 0])
     L = scales(seen.covariance)
-    goals = correct(seen, "contact").goals
+    goals = correct(seen, "contact").poses
     system = compact_equations(equations(seen.assembly, seen.start, goals), 2)
     beside = goals.copy()
     beside[1] = beside[1] @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
     assert length(seen, beside) > length(seen, goals)
-    there = descended(system, seen.goals, L, beside)
+    there = descended(system, seen.poses, L, beside)
     assert length(seen, there) == pytest.approx(length(seen, goals), rel=1e-9)
-    creeping = nearest_goals(system, seen.goals, L, None, correction_to(seen.goals, L, beside))
+    creeping = nearest_goals(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
     assert not creeping.at_rest
     assert length(seen, creeping.goals) > length(seen, there)
     assert not looking_away(seen.assembly, seen.start, there).any()

@@ -40,9 +40,9 @@ TOWER = "stick_in_tower"
 
 def seen_at(observation, k, T):
     """An observation in which operation k is seen at another pose, with the error that it was seen with."""
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[k] = T
-    return replace(observation, goals=goals)
+    return replace(observation, poses=goals)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -61,13 +61,13 @@ def test_a_part_that_is_seen_where_it_was_before_is_said_to_be(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_two_like_parts_that_are_seen_in_each_others_place_are_changed_back(seed):
     observation = look(TOWER, seed)
-    found = correct(replace(observation, goals=observation.goals[[1, 0, 2]]))
+    found = correct(replace(observation, poses=observation.poses[[1, 0, 2]]))
     assert "seen in each other's place: operation 1, 2" in found.sentence
     assert found.left_out == found.dropped == ()
     assert fixed_error_mm(TOWER, seed, found) < 0.1
     # What is free of the contacts is as it was seen, of the right part.
     plain = correct(observation, "contact")
-    assert_allclose(found.goals, plain.goals, atol=1e-6)
+    assert_allclose(found.poses, plain.poses, atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -75,10 +75,10 @@ def test_what_is_seen_too_near_says_the_rest_all_the_same(seed):
     """Along the ray nothing is known; across it and of the turn all that was seen is."""
     camera = Camera()
     observation = look(TOWER, seed)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[0, :3, 3] += 0.04 * camera.rays(goals)[0]
     told = OutlierModel(camera_m=tuple(camera.T_world_camera[:3, 3].tolist()))
-    found = correct(replace(observation, goals=goals, outliers=told))
+    found = correct(replace(observation, poses=goals, outliers=told))
     assert found.sentence.endswith("; seen too near or too far: operation 1")
     assert found.left_out == ()
     truth = shown(TOWER, seed)[2].goals
@@ -92,10 +92,10 @@ def test_operations_in_a_row_that_are_displaced_alike_are_displaced_together(see
     name = "vanished_fixture"
     observation = look(name, seed)
     E = pose.exp([0.03, -0.02, 0.015, 0.05, 0.06, -0.04])
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     middle = pose.at(goals[2:, :3, 3].mean(axis=0))
     goals[2:] = middle @ E @ pose.inverse(middle) @ goals[2:]
-    found = correct(replace(observation, goals=goals))
+    found = correct(replace(observation, poses=goals))
     assert "seen displaced together: operation 3, 4, 5" in found.sentence
     assert found.left_out == found.dropped == ()
 
@@ -169,8 +169,8 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     monkeypatch.setattr(Search, "likeliest", counted)
     scenario = load_scenario("gearbox")
     layout = draw_layout(scenario, np.random.default_rng([seed, 30, 0]), 0.0)
-    n = len(layout.goals)
-    first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    n = len(layout.poses)
+    first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     noise = make_failures("flips", NoiseLevel(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
     looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
@@ -213,9 +213,9 @@ def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
     """A contact too many in ten operations: one of the sets that are tried leads the compiled solver to no number."""
     scenario = load_scenario("gearbox")
     layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
-    first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((10, 6, 6)))
+    first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((10, 6, 6)))
     seen = make_noise("isotropic", NoiseLevel(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
-    wrong = with_contacts(seen, make_contacts("false"), layout.goals, np.random.default_rng([13, 9]))
+    wrong = with_contacts(seen, make_contacts("false"), layout.poses, np.random.default_rng([13, 9]))
     found = correct(wrong)
     assert found.ok
     assert found.dropped
@@ -227,9 +227,9 @@ def test_all_operations_may_be_false_together(seed):
     scenario = load_scenario("shaft_through_brackets")
     layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
     nothing = np.zeros((2, 6, 6))
-    truth = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
+    truth = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, nothing)
     observation = observe(truth, make_noise("isotropic", NoiseLevel(1.0, 1.0)), np.random.default_rng(seed))
-    found = correct(replace(observation, goals=observation.goals[::-1]), "contact-robust")
+    found = correct(replace(observation, poses=observation.poses[::-1]), "contact-robust")
     assert found.ok
     assert found.sentence.endswith("seen in each other's place: operation 1, 2")
-    assert goal_errors(scenario.assembly, layout.start, layout.goals, found.goals)[0] < 0.01
+    assert goal_errors(scenario.assembly, layout.start, layout.poses, found.poses)[0] < 0.01

@@ -30,7 +30,7 @@ class Again:
     def __call__(self, operations):
         self.asked.append(tuple(operations))
         made = self.observations.pop(0)
-        return replace(made, seen=made.seen & np.isin(np.arange(len(made.seen)), operations))
+        return replace(made, observed=made.observed & np.isin(np.arange(len(made.observed)), operations))
 
 
 def fresh(name, seed, number):
@@ -49,7 +49,7 @@ def test_where_nothing_is_in_doubt_nobody_asks():
     again = Again(at_the_same_place("vanished_fixture", 1, 0))
     observation = look("vanished_fixture", 1)
     assert (
-        correct(observation, "contact-robust", again).goals.tolist() == correct(observation, "contact").goals.tolist()
+        correct(observation, "contact-robust", again).poses.tolist() == correct(observation, "contact").poses.tolist()
     )
     assert again.asked == []
 
@@ -66,7 +66,7 @@ def test_what_was_left_out_is_looked_at_again_until_it_is_right():
     assert len(again.asked) == 2
     assert found.left_out == ()
     assert "looked again at operation" in found.sentence
-    assert_allclose(found.goals[k][:3, 3], shown(name, 2)[2].goals[k][:3, 3], atol=5e-3)
+    assert_allclose(found.poses[k][:3, 3], shown(name, 2)[2].goals[k][:3, 3], atol=5e-3)
     assert fixed_error_mm(name, 2, found) < 0.35
 
 
@@ -84,7 +84,7 @@ def test_an_operation_of_which_nothing_is_told_is_asked_for():
 def test_a_corrector_that_does_not_ask_gets_nothing():
     observation = astray(look("block_on_block", 1), 1)
     again = Again(at_the_same_place("block_on_block", 1, 0))
-    for corrector in ("contact", lambda seen: seen.goals):
+    for corrector in ("contact", lambda seen: seen.poses):
         correct(observation, corrector, again)
     assert again.asked == []
 

@@ -19,8 +19,8 @@ ROUNDING = 1e-18
 
 def of(observation: Observation, weight: float, off=None, deviation=SIGMA) -> Hypothesis:
     """A hypothesis whose goals are those that were seen, moved by a body twist."""
-    n = len(observation.goals)
-    goals = observation.goals @ pose.exp(np.zeros(6) if off is None else np.asarray(off, dtype=np.float64))
+    n = len(observation.poses)
+    goals = observation.poses @ pose.exp(np.zeros(6) if off is None else np.asarray(off, dtype=np.float64))
     return Hypothesis(weight, goals, np.tile(np.diag(deviation**2), (n, 1, 1)), observation)
 
 
@@ -39,7 +39,7 @@ def test_of_a_mode_it_is_the_second_moment_about_the_goals_of_the_first(observat
     found = mode_covariance((of(observation, 0.75), of(observation, 0.25, off, 2.0 * SIGMA)))
     expected = (0.75 + 0.25 * 4.0) * np.diag(SIGMA**2) + 0.25 * np.outer(off, off)
     # A turn at the other place moves this one, too, but that is small.
-    np.testing.assert_allclose(found[:, :3, :3], np.tile(expected[:3, :3], (len(observation.goals), 1, 1)), atol=2e-9)
+    np.testing.assert_allclose(found[:, :3, :3], np.tile(expected[:3, :3], (len(observation.poses), 1, 1)), atol=2e-9)
 
 
 def test_what_leads_elsewhere_is_another_mode(observation):
@@ -50,8 +50,8 @@ def test_what_leads_elsewhere_is_another_mode(observation):
 
 def test_the_region_of_a_correction_is_that_of_enough_hypotheses(observation):
     found = correct(observation, "contact")
-    truth = found.goals
-    away = replace(observation, goals=observation.goals @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 3.0])))
+    truth = found.poses
+    away = replace(observation, poses=observation.poses @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 3.0])))
     right = Hypothesis(0.1, truth, found.covariance, observation)
     wrong = Hypothesis(0.9, away.goals, found.covariance, away)
     assert contains_truth(observation, replace(found, hypotheses=(wrong, right)), truth)

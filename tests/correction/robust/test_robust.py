@@ -39,7 +39,7 @@ def shown(name, seed=0):
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
     nothing = np.zeros((len(scenario.assembly), 6, 6))
-    return scenario, layout, Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
+    return scenario, layout, Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, nothing)
 
 
 def look(name, seed, noise_level=1.0):
@@ -51,15 +51,15 @@ def look(name, seed, noise_level=1.0):
 def astray(observation, k, seed=0):
     """Operation k seen somewhere else and turned anyhow."""
     rng = np.random.default_rng([seed, k])
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     q = rng.standard_normal(4)
     goals[k] = goals[k] @ pose.unpack(np.concatenate([rng.uniform(-0.5, 0.5, 3), q]))
-    return replace(observation, goals=goals)
+    return replace(observation, poses=goals)
 
 
 def fixed_error_mm(name, seed, correction):
     scenario, layout, _ = shown(name, seed)
-    return goal_errors(scenario.assembly, layout.start, layout.goals, correction.goals)[0]
+    return goal_errors(scenario.assembly, layout.start, layout.poses, correction.poses)[0]
 
 
 @pytest.mark.parametrize("name", BOXES)
@@ -68,7 +68,7 @@ def test_without_outliers_it_is_contact(name):
     plain = correct(observation, "contact")
     robust = correct(observation, "contact-robust")
     assert plain.test.passes
-    assert robust.goals.tolist() == plain.goals.tolist()
+    assert robust.poses.tolist() == plain.poses.tolist()
     assert (robust.status, robust.sentence) == ("converged", plain.sentence)
     # Noise that seems a little larger than stated makes regions larger, and nothing else.
     grown = 1.0 if robust.noise_scale == 1.0 else robust.noise_scale**2 * (1.0 + 2.0 / plain.test.freedom)
@@ -86,8 +86,8 @@ def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
             observation = astray(look(name, 2), k)
             found = correct(observation, "contact-robust")
             assert found.ok
-            assert largest_gap(scenario.assembly, observation.start, found.goals) <= observation.gap_m
-            assert not looking_away(scenario.assembly, observation.start, found.goals).any()
+            assert largest_gap(scenario.assembly, observation.start, found.poses) <= observation.gap_m
+            assert not looking_away(scenario.assembly, observation.start, found.poses).any()
             all_of_them += 1
             right += found.left_out == (k,) and f"; left out what was seen of operation {k + 1}" in found.sentence
     assert right >= all_of_them - 1
@@ -111,9 +111,9 @@ def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one
     last = len(scenario.assembly) - 1
     inferred = inferred_goals(astray(exact, last), [last])
     assert inferred.baseless == ()
-    observation = replace(exact, goals=inferred.goals)
-    assert largest_gap(scenario.assembly, layout.start, observation.goals) < 2e-3
-    assert not looking_away(scenario.assembly, layout.start, observation.goals).any()
+    observation = replace(exact, poses=inferred.goals)
+    assert largest_gap(scenario.assembly, layout.start, observation.poses) < 2e-3
+    assert not looking_away(scenario.assembly, layout.start, observation.poses).any()
 
 
 def test_planes_that_are_parallel_but_for_noise_do_not_say_where_they_meet():
@@ -142,21 +142,21 @@ def test_a_single_operation_that_was_seen_turned_is_turned_back():
     about_y = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
     turned = made.goals[:1] @ about_y
     stated = OutlierModel(gross=0.3)
-    one = {"goals": turned, "covariance": made.covariance[:1], "seen": made.seen[:1]}
+    one = {"poses": turned, "covariance": made.covariance[:1], "observed": made.observed[:1]}
     observation = replace(made, assembly=single, outliers=stated, **one)
     found = correct(observation, "contact-robust")
     assert found.ok
     assert found.dropped == ()
     assert "seen turned: operation 1" in found.sentence
-    assert not looking_away(single, made.start, found.goals).any()
+    assert not looking_away(single, made.start, found.poses).any()
 
 
 def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
     observation = look("stick_in_tower", 5, 0.5)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     last = len(goals) - 1
     goals[last] = goals[last] @ pose.exp([0.004, -0.005, 0.004, 0.07, 0.06, -0.05])
-    observation = replace(observation, goals=goals)
+    observation = replace(observation, poses=goals)
     found = correct(observation, "contact-robust")
     assert found.ok
     assert "left out" not in found.sentence
@@ -187,7 +187,7 @@ def test_parts_of_which_too_little_was_seen_are_beside_the_others():
     observation = astray(look("carried_bridge", 7, 0.5), 1)
     found = contact_robust(observation)
     assert found.ok
-    assert crowding(observation, found.goals)[:2] == (0, 0.0)
+    assert crowding(observation, found.poses)[:2] == (0, 0.0)
 
 
 @pytest.mark.parametrize("wrong", [{"gross": 0.0}, {"gross": 0.7, "broad": 0.4}, {"times": 1.0}, {"relation": 1.0}])
@@ -205,8 +205,8 @@ def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():
     deviation = np.sqrt(np.linalg.eigvalsh(found.covariance[4][:3, :3]))
     assert deviation[-1] == pytest.approx(0.05, rel=0.05)
     assert deviation[0] < 0.002
-    assert contains_truth(observation, found, layout.goals)
-    assert not contains_truth(observation, replace(found, believed=None, hypotheses=()), layout.goals)
+    assert contains_truth(observation, found, layout.poses)
+    assert not contains_truth(observation, replace(found, believed=None, hypotheses=()), layout.poses)
 
 
 def test_a_relation_may_be_to_blame_in_place_of_an_observation():
@@ -247,21 +247,21 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     assert found.left_out == ()
     (dropped,) = found.dropped
     assert dropped.startswith(f"{culprit(observation.assembly, wrong.assembly)}: ")
-    assert goal_errors(observation.assembly, observation.start, truth, found.goals)[0] < 0.1
+    assert goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
 
 
 @pytest.mark.parametrize("seed", range(5, 9))
 def test_a_pose_that_is_flipped_is_turned_back_and_no_relation_is_blamed(seed):
     observation = look("vanished_fixture", seed)
     truth = shown("vanished_fixture", seed)[1].goals
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[1] = goals[1] @ pose.at((0.0, 0.0, 0.0), (0.0, 180.0, 0.0))
-    found = correct(replace(observation, goals=goals), "contact-robust")
+    found = correct(replace(observation, poses=goals), "contact-robust")
     assert found.ok
     assert found.dropped == ()
     assert found.left_out == ()
     assert "seen turned: operation 2" in found.sentence
-    assert goal_errors(observation.assembly, observation.start, truth, found.goals)[0] < 0.1
+    assert goal_errors(observation.assembly, observation.start, truth, found.poses)[0] < 0.1
 
 
 def test_all_hypotheses_are_kept_with_their_weights():
@@ -273,7 +273,7 @@ def test_all_hypotheses_are_kept_with_their_weights():
     first = found.hypotheses[0]
     assert first.left_out == found.left_out == (1,)
     assert first.sentence == "left out what was seen of operation 2"
-    np.testing.assert_array_equal(first.goals, found.goals)
+    np.testing.assert_array_equal(first.poses, found.poses)
     assert correct(look("block_on_block", 5), "contact-robust").hypotheses == ()
 
 
@@ -284,9 +284,9 @@ def test_all_hypotheses_are_kept_with_their_weights():
 def test_no_relation_is_blamed_while_what_was_seen_of_two_operations_explains_as_much(name, pair):
     """Both are 25 mm off by one displacement, as if the view had moved."""
     observation = look(name, 5)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[list(pair)] = pose.exp(np.array([0.02, 0.015, 0.0, 0.0, 0.0, 0.1])) @ goals[list(pair)]
-    found = correct(replace(observation, goals=goals), "contact-robust")
+    found = correct(replace(observation, poses=goals), "contact-robust")
     assert found.ok
     assert found.dropped == ()
 
@@ -294,9 +294,9 @@ def test_no_relation_is_blamed_while_what_was_seen_of_two_operations_explains_as
 def test_rates_are_those_that_the_observation_states():
     """A noise that has no gross errors, but one in two that is a hundred times as large."""
     observation = look("stick_in_tower", 5, 0.2)
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     goals[-1] = goals[-1] @ pose.exp(0.02 * np.array([1.0, -1.0, 1.0, 10.0, 10.0, -10.0]))
-    observation = replace(observation, goals=goals)
+    observation = replace(observation, poses=goals)
     assert correct(observation, "contact-robust").left_out == (2,)
     known = replace(observation, outliers=OutlierModel(0.001, 0.49, 100.0))
     found = correct(known, "contact-robust")
@@ -313,10 +313,10 @@ def test_of_many_operations_sets_grow_one_at_a_time(monkeypatch):
 @pytest.mark.parametrize("name", ["pocket_table", "vanished_fixture"])
 def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
     observation = astray(look(name, 2), 1)
-    n = len(observation.goals)
+    n = len(observation.poses)
     p = len(observation.assembly.solids)
     rest = ContactAgreement(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
-    e, Jt = linearised_by(seen_system(observation), observation.goals, noise_factor(observation))
+    e, Jt = linearised_by(seen_system(observation), observation.poses, noise_factor(observation))
     soft = np.hypot(soft_deviation(observation), 3.0 * np.radians(1.0) ** 2 * 0.1)
     found = []
     for left_out in (s for size in range(n) for s in combinations(range(n), size)):
@@ -332,7 +332,7 @@ def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
 def test_what_faces_cover_is_the_area_of_their_overlap():
     for name in BOXES:
         observation = look(name, 1)
-        at = placements(observation.assembly, observation.start, observation.goals)[-1]
+        at = placements(observation.assembly, observation.start, observation.poses)[-1]
         for m, e in (contact for operation in observation.assembly.operations for contact in operation.contacts):
             faces = observation.assembly.face(m), at[m.part], observation.assembly.face(e), at[e.part]
             assert overlap_area(*faces) == overlap(*faces).area

@@ -128,10 +128,10 @@ def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(play_m:
 
 def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
     first = observed("pocket_table", 2.0, 1.0, 0)
-    seen = [replace(first, goals=observed("pocket_table", 2.0, 1.0, seed).goals) for seed in range(3)]
+    seen = [replace(first, poses=observed("pocket_table", 2.0, 1.0, seed).poses) for seed in range(3)]
     for one, made in zip(seen, correct_many(seen, contact), strict=True):
         alone = correct(one, "contact")
-        assert np.array_equal(made.goals, alone.goals)
+        assert np.array_equal(made.poses, alone.poses)
         assert (made.covariance is None) == (alone.covariance is None)
         assert made.trace == alone.trace
         assert made.test == alone.test
@@ -149,8 +149,8 @@ def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_without_numba_contact_is_not_compiled() -> None:
     one = observed("bridge_cycle", 2.0, 1.0, 0)
     uncompiled = correct(one, ContactCorrector(compiled=False))
-    assert np.array_equal(correct(one, "contact").goals, uncompiled.goals)
-    np.testing.assert_allclose(correct_many([one], contact)[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
+    assert np.array_equal(correct(one, "contact").poses, uncompiled.poses)
+    np.testing.assert_allclose(correct_many([one], contact)[0].poses, uncompiled.poses, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 3.0])

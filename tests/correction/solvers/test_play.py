@@ -83,8 +83,8 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
         asked = problem_of((seen,))
         system = asked.laid.system.only(0)
         slack_m = fit_deviation(seen.assembly, seen.play_m)
-        exact = nearest_goals(system, seen.goals, asked.L[0])
-        soft = nearest_goals(system, seen.goals, asked.L[0], slack_m)
+        exact = nearest_goals(system, seen.poses, asked.L[0])
+        soft = nearest_goals(system, seen.poses, asked.L[0], slack_m)
         over = soft.e[slack_m > 0.0] / slack_m[slack_m > 0.0]
         S = np.diag(slack_m**2)
         short = float(softened_chi_square(exact.z[None], exact.Jt[None], S)[0])
@@ -94,7 +94,7 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
 def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     """It lay at the bottom of the hole, then the cube hangs on it, and it lies on the slot: three plays in all."""
     scenario, layout, _ = shown("carried_bridge")
-    goals = np.array(layout.goals)
+    goals = np.array(layout.poses)
     goals[3, 2, 3] -= PLAY_M
     goals[4, 2, 3] -= 2.0 * PLAY_M
     deep = equations(scenario.assembly, layout.start, goals).gaps(goals)

@@ -90,7 +90,7 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
     stated = np.zeros((n, 6, 6))
     for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))], contact)):
         assert made.covariance is not None
-        errors[seed] = pose.log(pose.inverse(made.goals) @ scene.goals)
+        errors[seed] = pose.log(pose.inverse(made.poses) @ scene.goals)
         stated += made.covariance / len(errors)
     empirical = np.einsum("sni,snj->nij", errors, errors) / len(errors)
     deviation = np.sqrt(np.einsum("nii->ni", stated))
@@ -127,12 +127,12 @@ def test_only_free_directions_count() -> None:
     L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
-    assert contains_truth(seen, made, made.goals)
+    assert contains_truth(seen, made, made.poses)
     for mm, expected in ((1.0, True), (12.0, False), (-12.0, False)):
-        aside = np.array(made.goals)
+        aside = np.array(made.poses)
         aside[2] = aside[2] @ scenes.mm(mm, 0, 0)
         assert contains_truth(seen, made, aside) is expected
-    lifted = np.array(made.goals)
+    lifted = np.array(made.poses)
     lifted[:, 2, 3] += 0.012
     assert contains_truth(seen, made, lifted)
 
@@ -143,7 +143,7 @@ def test_what_was_left_out_no_longer_fixes_anything() -> None:
     L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
-    lifted = np.array(made.goals)
+    lifted = np.array(made.poses)
     lifted[2] = lifted[2] @ scenes.mm(0, 0, 12)
     for dropped, expected in (((), True), (("R3",), True), (("R3", "R4"), False)):
         assert contains_truth(seen, replace(made, dropped=dropped), lifted) is expected
@@ -161,7 +161,7 @@ def test_where_there_is_no_region_there_is_no_answer() -> None:
     L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     assert contains_truth(seen, correct(seen, "paper"), scene.goals) is None
-    unseen = replace(seen, seen=np.array([True, True, False]))
+    unseen = replace(seen, observed=np.array([True, True, False]))
     assert contains_truth(unseen, correct(unseen, "contact"), scene.goals) is None
     made = correct(seen, "contact")
     assert contains_truth(seen, replace(made, status="doubtful"), scene.goals) is None
@@ -173,7 +173,7 @@ def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -
     seen = look(scene, scales(1, 1.0, 1.0), 0)
     made = correct(seen, "contact")
     assert (made.ok, made.rank) == (True, 6)
-    assert_allclose(made.goals, scene.goals, rtol=0, atol=1e-12)
+    assert_allclose(made.poses, scene.goals, rtol=0, atol=1e-12)
     assert made.covariance is not None
     assert np.abs(made.covariance).max() <= 1e-20
     assert contains_truth(seen, made, scene.goals) is None

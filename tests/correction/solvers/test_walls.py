@@ -48,7 +48,7 @@ def look(assembly: Assembly, scene: scenes.Scene, goals: Array, L: Array, play_m
 
 def beyond(seen: Observation, goals: Array) -> float:
     """How far the worst vertex is out of the interval that is asked, [m]."""
-    system = equations(seen.assembly, seen.start, seen.goals)
+    system = equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e = system.residual(goals)
@@ -58,10 +58,10 @@ def beyond(seen: Observation, goals: Array) -> float:
 def unbalanced(seen: Observation, goals: Array) -> float:
     """What neither equations nor touched walls, pushing inwards, account for in z (Karush, Kuhn and Tucker)."""
     L = np.linalg.cholesky(seen.covariance)
-    xi = pose.log(pose.inverse(seen.goals) @ goals)
-    z = correction(seen.goals, goals, np.asarray(L, dtype=np.float64))
+    xi = pose.log(pose.inverse(seen.poses) @ goals)
+    z = correction(seen.poses, goals, np.asarray(L, dtype=np.float64))
     B = right_jacobian(xi) @ L
-    system = equations(seen.assembly, seen.start, seen.goals)
+    system = equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e, J = system.linearised(goals)
@@ -94,12 +94,12 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
         seen = look(assembly, scene, twisted(truth, L, rng), L)
         made = correct(seen, "contact")
         assert made.ok, (seed, made.sentence)
-        assert beyond(seen, made.goals) <= 1e-12
-        z = correction(seen.goals, made.goals, L)
-        true = correction(seen.goals, truth, L)
+        assert beyond(seen, made.poses) <= 1e-12
+        z = correction(seen.poses, made.poses, L)
+        true = correction(seen.poses, truth, L)
         assert z @ z <= (true @ true) * (1 + 1e-9)
-        assert unbalanced(seen, made.goals) <= 1e-6
-        touched += beyond(seen, made.goals) > -1e-9
+        assert unbalanced(seen, made.poses) <= 1e-6
+        touched += beyond(seen, made.poses) > -1e-9
     assert touched > 0
 
 
@@ -116,11 +116,11 @@ def test_a_part_that_was_seen_between_its_walls_stays() -> None:
     inside = look(assembly, scene, np.array([scenes.mm(3, 4, 25.4)]), L)
     made = correct(inside, "contact")
     assert (made.ok, made.rank) == (True, 0)
-    assert_array_equal(made.goals, inside.goals)
+    assert_array_equal(made.poses, inside.poses)
     above = look(assembly, scene, np.array([scenes.mm(3, 4, 28)]), L)
-    assert_allclose(correct(above, "contact").goals, [scenes.mm(3, 4, 26)], rtol=0, atol=1e-9)
+    assert_allclose(correct(above, "contact").poses, [scenes.mm(3, 4, 26)], rtol=0, atol=1e-9)
     below = look(assembly, scene, np.array([scenes.mm(3, 4, 15)]), L)
-    assert_allclose(correct(below, "contact").goals, [scenes.mm(3, 4, 24)], rtol=0, atol=1e-9)
+    assert_allclose(correct(below, "contact").poses, [scenes.mm(3, 4, 24)], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["contact", ContactCorrector(compiled=False)], ids=["as it comes", "plain"])
@@ -134,11 +134,11 @@ def test_contact_puts_parts_that_fit_one_play_lower(method: Any) -> None:
     goals = twisted(scene.goals, L, np.random.default_rng(3))
     made = correct(look(assembly, scene, goals, L, 1e-3 * play_mm), method)
     assert (made.ok, made.rank) == (True, 13)
-    assert_allclose(made.goals[2, 2, 3], 0.04 - 1e-3 * play_mm, rtol=0, atol=1e-12)
+    assert_allclose(made.poses[2, 2, 3], 0.04 - 1e-3 * play_mm, rtol=0, atol=1e-12)
     assert made.gap_after_m <= 1e-12
     assert made.gap_before_m > 1e-4
     centred = correct(look(scene.assembly, scene, goals, L, 1e-3 * play_mm), method)
-    assert_allclose(centred.goals[2, 2, 3], 0.04, rtol=0, atol=1e-12)
+    assert_allclose(centred.poses[2, 2, 3], 0.04, rtol=0, atol=1e-12)
 
 
 def test_clearance_without_numbers_is_the_play() -> None:
@@ -147,7 +147,7 @@ def test_clearance_without_numbers_is_the_play() -> None:
     goals = twisted(scene.goals, L, np.random.default_rng(5))
     play = look(walled(scene, "stick_on_castles", Gap("clearance")), scene, goals, L, 0.5e-3)
     said = look(walled(scene, "stick_on_castles", Gap("clearance", -0.5e-3, 0.5e-3)), scene, goals, L, 0.5e-3)
-    assert_array_equal(correct(play, "contact").goals, correct(said, "contact").goals)
+    assert_array_equal(correct(play, "contact").poses, correct(said, "contact").poses)
 
 
 @pytest.mark.parametrize("intervals_mm", [((1.0, 2.0), (0.0, 1.0)), ((-9.0, -8.0), (-9.0, 0.0))])

@@ -35,7 +35,7 @@ def imported(
 
 
 def goals(name: str) -> np.ndarray:
-    return layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
+    return layout_at(load_scenario(name), 0.1, 0.0, 0.3).poses
 
 
 @pytest.mark.parametrize("name", [NAME, "carried_bridge"])
@@ -44,7 +44,7 @@ def test_goals_are_found_within_the_noise_of_their_means(name: str, camera: str)
     tracks = seen(name, 0.5)
     stated = GIVEN if camera == "given" else replace(KNOWN, known=dict.fromkeys(tracks))
     recording = imported(tracks, stated, name)
-    off = pose.log(pose.inverse(goals(name)) @ recording.observation.goals)
+    off = pose.log(pose.inverse(goals(name)) @ recording.observation.poses)
     # 24 frames and more: 0.1 mm and 0.1 deg per axis; five times that, and as much again for a solved camera.
     assert np.abs(off[:, :3]).max() < 1e-3
     assert np.degrees(np.abs(off[:, 3:]).max()) < 1.0
@@ -61,7 +61,7 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
         kept = rng.random(len(t)) > 0.2
         tracks[part] = PoseTrack(t[kept], wrong[kept])
     recording = imported(tracks)
-    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
+    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.poses)
     assert np.abs(off[:, :3]).max() < 1e-3
     assert all(not operation.rest.mean.inlier.all() for operation in recording.operations if operation.rest is not None)
 
@@ -74,7 +74,7 @@ def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
     }
     repeated = imported(often)
     plain = imported(tracks)
-    off = pose.log(pose.inverse(goals(NAME)) @ repeated.observation.goals)
+    off = pose.log(pose.inverse(goals(NAME)) @ repeated.observation.poses)
     assert np.abs(off[:, :3]).max() < 1e-3
     means = (
         [operation.rest.mean.covariance for operation in each.operations if operation.rest]
@@ -138,9 +138,9 @@ def test_a_camera_is_solved_alike_with_and_without_a_scenario() -> None:
 def test_times_may_be_stated_and_operations_left_out() -> None:
     tracks = seen(NAME, 0.5)
     by_time = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
-    assert np.array_equal(by_time.observation.goals, imported(tracks).observation.goals)
+    assert np.array_equal(by_time.observation.poses, imported(tracks).observation.poses)
     hidden = imported(tracks, stated=Stated(unseen=(1,)))
-    assert hidden.observation.seen.tolist() == [True, False, True]
+    assert hidden.observation.observed.tolist() == [True, False, True]
     with pytest.raises(InputError, match=r"'castle2' does not rest at 3\.3 s, where operation 2 is to have ended"):
         imported(tracks, stated=Stated(ends=(2.2, 3.3, 5.8)))
 
@@ -196,11 +196,11 @@ def test_a_part_that_is_hidden_while_others_are_placed_is_where_it_is_seen_again
     whole = imported(tracks)
     # The stick waits hidden while both castles are placed, and is seen again shortly before it is taken.
     recording = imported({**tracks, "stick": without(tracks["stick"], 0.6, 3.9)})
-    assert np.allclose(recording.observation.goals, whole.observation.goals, atol=1e-4)
+    assert np.allclose(recording.observation.poses, whole.observation.poses, atol=1e-4)
     # It is taken while it is hidden.
     later = imported({**tracks, "stick": without(tracks["stick"], 0.6, 4.8)})
     assert re.fullmatch(r"'stick' was hidden from 0\.[56]\d to 4\.8\d s", *later.unclear)
-    off = pose.log(pose.inverse(whole.observation.goals) @ later.observation.goals)
+    off = pose.log(pose.inverse(whole.observation.poses) @ later.observation.poses)
     assert np.abs(off[:, :3]).max() < 1e-3
     assert all(np.linalg.norm(twist[:3]) < 1e-3 for each in later.operations for twist in each.adjusted.values())
 
@@ -212,7 +212,7 @@ def test_what_moved_before_the_operation_before_had_ended_is_no_error() -> None:
     tracks["stick"] = flipped(tracks["stick"], (t > 3.35) & (t < 4.5) & (np.arange(len(t)) % 2 == 0))
     recording = imported(tracks)
     assert recording.stays["stick"][0].ends < recording.stays["castle2"][1].begins
-    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
+    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.poses)
     assert np.abs(off[:, :3]).max() < 1e-3
     assert np.diagonal(recording.observation.covariance, axis1=1, axis2=2)[:, :3].max() < 1e-5
 

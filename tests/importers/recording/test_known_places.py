@@ -49,7 +49,7 @@ def test_places_that_disagree_make_the_camera_unsure() -> None:
 def test_a_contact_is_wrong_by_its_gap_in_mm_and_its_angle_in_degrees(up_mm: float, tilt_deg: float) -> None:
     scenario = load_scenario("block_on_block")
     layout = layout_at(scenario, 0.1, 0.0, 0.3)
-    bottom = pose.at((0.0, 0.0, up_mm * 1e-3)) @ layout.goals[0]
+    bottom = pose.at((0.0, 0.0, up_mm * 1e-3)) @ layout.poses[0]
     half = pose.at((0.0, 0.0, scenario.assembly.solids["A"].bounds[0, 2]))
     tilted = bottom @ half @ pose.at((0.0, 0.0, 0.0), (tilt_deg, 0.0, 0.0)) @ pose.inverse(half)
     fit = contact_fit(scenario.assembly, 0, {**layout.start, scenario.assembly.operations[0].main: tilted})

@@ -67,7 +67,7 @@ def observed(name: str, noise_mm: float, seed: int = 3) -> Observation:
 
 def errors(name: str, seen: Observation, seed: int = 3) -> Array:
     """Body twists, (n, 6), by which seen goals are away from shown ones, [mm, deg]."""
-    xi = pose.log(pose.inverse(seen.goals) @ watched(name, seed).demonstration.goals)
+    xi = pose.log(pose.inverse(seen.poses) @ watched(name, seed).demonstration.poses)
     return np.hstack([1e3 * xi[:, :3], np.degrees(xi[:, 3:])])
 
 
@@ -75,7 +75,7 @@ def errors(name: str, seen: Observation, seed: int = 3) -> Array:
 def test_being_watched_changes_nothing(name: str) -> None:
     alone = simulate_demonstration(scene(name), 1.0, 3).demonstration
     seen = watched(name).demonstration
-    assert alone.goals.tobytes() == seen.goals.tobytes()
+    assert alone.poses.tobytes() == seen.poses.tobytes()
     assert {part: T.tobytes() for part, T in alone.final.items()} == {
         part: T.tobytes() for part, T in seen.final.items()
     }
@@ -126,7 +126,7 @@ def test_it_is_quiet_only_when_nothing_changes_for_a_while() -> None:
 def test_images_are_of_parts_at_rest(name: str) -> None:
     """Without noise every pose is that at which the hand had let go, so firings are neither early nor late."""
     seen = observed(name, 0.0)
-    assert seen.seen.all()
+    assert seen.observed.all()
     off = errors(name, seen)
     assert np.abs(off[:, :3]).max() < 0.1
     assert np.abs(off[:, 3:]).max() < 0.1
@@ -136,7 +136,7 @@ def test_images_are_of_parts_at_rest(name: str) -> None:
 def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> None:
     seen = observed(name, 1.0)
     off = errors(name, seen)
-    assert seen.seen.all()
+    assert seen.observed.all()
     assert np.median(np.linalg.norm(off[:, :3], axis=1)) < 0.5
     assert np.median(np.linalg.norm(off[:, 3:], axis=1)) < 1.0
     eigenvalues = np.linalg.eigvalsh(seen.covariance)
@@ -145,9 +145,9 @@ def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> N
 
 def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
     one, again, two = (observed("stick_in_tower", noise_level) for noise_level in (1.0, 1.0, 2.0))
-    assert one.goals.tobytes() == again.goals.tobytes()
+    assert one.poses.tobytes() == again.poses.tobytes()
     assert one.covariance.tobytes() == again.covariance.tobytes()
-    assert (one.goals != two.goals).any()
+    assert (one.poses != two.poses).any()
     assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
     fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "depth-camera").images
     known = watched("stick_in_tower").images
@@ -161,13 +161,13 @@ def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
 @pytest.mark.parametrize("seed", [2, 3])
 def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
     simulated = watched("stick_in_tower", seed)
-    moved = (simulated.demonstration.final["castle2"] - simulated.demonstration.goals[1])[:3, 3]
+    moved = (simulated.demonstration.final["castle2"] - simulated.demonstration.poses[1])[:3, 3]
     assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
     pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
     events = pose_source.events(simulated.demonstration, pose_source.sensed(stream(seed, OBSERVATION)))
     assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
     seen = observed("stick_in_tower", 1.0, seed)
-    away = (seen.goals[1] - simulated.demonstration.goals[1])[:3, 3]
+    away = (seen.poses[1] - simulated.demonstration.poses[1])[:3, 3]
     assert 1e3 * np.linalg.norm(away) < 0.5
 
 
@@ -179,9 +179,9 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
     wrong = replace(assembly, solids={**assembly.solids, "stick": short})
     pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
     seen = pose_source(wrong, replace(simulated.demonstration, assembly=wrong), stream(3, OBSERVATION))
-    assert seen.seen.tolist() == [True, True, False]
+    assert seen.observed.tolist() == [True, True, False]
     assert seen.covariance[2][0, 0] > 0.005
-    assert np.array_equal(seen.goals[2], simulated.layout.start["stick"])
+    assert np.array_equal(seen.poses[2], simulated.layout.start["stick"])
 
 
 def test_an_operation_that_no_image_shows_is_not_seen() -> None:
@@ -189,9 +189,9 @@ def test_an_operation_that_no_image_shows_is_not_seen() -> None:
     pose_source = range_sensor(scene("stick_in_tower"), simulated, 1.0)
     blind = replace(pose_source, images=pose_source.images[:2])
     seen = observe_demonstration(simulated, blind, 3)
-    assert seen.seen.tolist() == [True, False, False]
+    assert seen.observed.tolist() == [True, False, False]
     none = replace(pose_source, images=pose_source.images[:1])
-    assert not observe_demonstration(simulated, none, 3).seen.any()
+    assert not observe_demonstration(simulated, none, 3).observed.any()
 
 
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
@@ -202,8 +202,8 @@ def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
     turned[2] = turned[2] @ S[:3, :3]
     other = replace(pose_source, turns=turned)
     a, b = (e(shown.demonstration.assembly, shown.demonstration, stream(3, OBSERVATION)) for e in (pose_source, other))
-    assert np.array_equal(a.goals[:2], b.goals[:2])
-    assert b.goals[2] == pytest.approx(a.goals[2] @ S, abs=1e-9)
+    assert np.array_equal(a.poses[:2], b.poses[:2])
+    assert b.poses[2] == pytest.approx(a.poses[2] @ S, abs=1e-9)
     assert sorted(np.linalg.eigvalsh(b.covariance[2])) == pytest.approx(
         sorted(np.linalg.eigvalsh(a.covariance[2])), rel=1e-6
     )

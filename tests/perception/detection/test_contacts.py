@@ -38,7 +38,7 @@ def seen_at(scene: scenes.Scene, seed: int, noise_level: float, play_m: float = 
 
 def stated(seen: Observation, noise_level: float, play_m: float = 0.0) -> Observation:
     covariance = np.tile(
-        np.diag(np.repeat([noise_level * 1e-3, np.radians(noise_level)], 3) ** 2), (len(seen.goals), 1, 1)
+        np.diag(np.repeat([noise_level * 1e-3, np.radians(noise_level)], 3) ** 2), (len(seen.poses), 1, 1)
     )
     return replace(seen, covariance=floored(covariance), play_m=play_m)
 
@@ -79,7 +79,7 @@ def test_scenarios_of_the_package_are_recognised_with_their_own_play(name: str) 
     scenario = load_scenario(name)
     for seed in range(3):
         layout = draw_layout(scenario, np.random.default_rng(seed))
-        scene = scenes.Scene(scenario.assembly, layout.start, layout.goals)
+        scene = scenes.Scene(scenario.assembly, layout.start, layout.poses)
         seen = seen_at(scene, seed, 0.5, play_m=scenario.clearance_mm * 1e-3)
         assert contacts(recognise(seen).assembly) == contacts(scenario.assembly)
 
@@ -132,9 +132,9 @@ def test_what_counts_as_near_follows_the_noise_up_to_a_bound() -> None:
 def test_faces_that_cover_little_of_each_other_do_not_touch() -> None:
     for aside_mm, touches in ((40.0, True), (44.0, False)):
         seen = blocks(0.0, 0.2)
-        goals = np.array(seen.goals)
+        goals = np.array(seen.poses)
         goals[1, 1, 3] += aside_mm * 1e-3
-        assert side_by_side(replace(seen, goals=goals)) is touches
+        assert side_by_side(replace(seen, poses=goals)) is touches
 
 
 def test_of_contacts_that_exclude_each_other_those_are_taken_that_fit_together() -> None:
@@ -155,7 +155,7 @@ def test_parts_that_are_carried_keep_the_contacts_among_themselves() -> None:
 
 def test_what_was_not_seen_touches_nothing() -> None:
     scene = scenes.stick_in_tower()
-    seen = replace(seen_at(scene, 0, 0.5), seen=np.array([True, False, True]))
+    seen = replace(seen_at(scene, 0, 0.5), observed=np.array([True, False, True]))
     right = {(k, c) for k, c in contacts(scene.assembly) if "castle2" not in (c.manipulated.part, c.environment.part)}
     assert contacts(recognise(seen).assembly) == right
 
@@ -182,7 +182,7 @@ def test_kinds_of_gaps_are_not_looked_at() -> None:
     contact = scenario.assembly.operations[0].contacts[0]
     with_gap = replace(scenario.assembly, gaps={contact: Gap("contact")})
     layout = draw_layout(scenario, np.random.default_rng(0))
-    seen = stated(scenes.seen(scenes.Scene(with_gap, layout.start, layout.goals), layout.goals), 0.5)
+    seen = stated(scenes.seen(scenes.Scene(with_gap, layout.start, layout.poses), layout.poses), 0.5)
     assert not recognise(seen).assembly.gaps
 
 

@@ -54,9 +54,9 @@ def names(assembly: Assembly) -> set[str]:
 
 def test_without_contacts_nothing_is_gained_and_nothing_moved() -> None:
     seen = block_at(3, 4, 27)
-    estimated = estimate(seen, seen.assembly, seen.goals)
+    estimated = estimate(seen, seen.assembly, seen.poses)
     assert estimated.badness == 0.0
-    assert_allclose(estimated.goals, seen.goals, atol=1e-12)
+    assert_allclose(estimated.goals, seen.poses, atol=1e-12)
     assert_allclose(estimated.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
 
 
@@ -65,17 +65,17 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
-        estimated = estimate(seen, scene.assembly, seen.goals)
+        estimated = estimate(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector(compiled=False)(seen)
         assert np.abs(equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max() < 5e-4
-        assert_allclose(estimated.goals, corrected.goals, atol=2e-2)
+        assert_allclose(estimated.goals, corrected.poses, atol=2e-2)
 
 
 def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
     """A block 2 mm above the table: only the vertical and two tilts are asked for."""
     noise_level = 1.0
     seen = block_at(0, 0, 27)
-    estimated = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
+    estimated = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.poses)
     s = np.array([noise_level * 1e-3, np.radians(noise_level), np.radians(noise_level)])
     room = np.hypot(s, [40e-3, np.radians(23.0), np.radians(23.0)])
     by_hand = 2.0 * (
@@ -90,11 +90,11 @@ def test_a_contact_that_others_imply_gains_nothing() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 2, 1.0)
-        every = estimate(seen, scene.assembly, seen.goals)
+        every = estimate(seen, scene.assembly, seen.poses)
         last = scene.assembly.operations[-1]
         doubled = replace(last, contacts=(*last.contacts, last.contacts[0]))
         twice = replace(scene.assembly, operations=(*scene.assembly.operations[:-1], doubled))
-        assert estimate(seen, twice, seen.goals).badness == pytest.approx(every.badness, abs=0.05)
+        assert estimate(seen, twice, seen.poses).badness == pytest.approx(every.badness, abs=0.05)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -148,7 +148,7 @@ def test_parts_that_are_seen_inside_each_other_touch() -> None:
 
 def test_operations_that_were_not_seen_make_no_contact() -> None:
     seen = beside(0.5, 1.0)
-    blind = replace(seen, seen=np.array([True, False]))
+    blind = replace(seen, observed=np.array([True, False]))
     assert names(recognise_jointly(blind).assembly) == {"A.nz on table.top"}
 
 

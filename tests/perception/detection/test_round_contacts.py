@@ -42,10 +42,10 @@ def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float)
 def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
     scene = built("nested")
     seen = seen_at(scene, 4, 0.5)
-    goals = np.array(seen.goals)
+    goals = np.array(seen.poses)
     goals[2] = goals[2] @ pose.exp([0, 0, 0, 0, 0, 2.1])
     recognised = recognise(seen)
-    again = recognise(replace(seen, goals=goals))
+    again = recognise(replace(seen, poses=goals))
     assert contacts(again.assembly) == contacts(scene.assembly)
     assert_allclose([e.gap_m for e in again.evidence], [e.gap_m for e in recognised.evidence], rtol=0, atol=5e-5)
     assert_allclose(

@@ -20,7 +20,7 @@ NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 def demonstration():
     scenario = load_scenario("vanished_fixture")
     layout = draw_layout(scenario, np.random.default_rng(0), 0.0)
-    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((5, 6, 6)))
+    return Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((5, 6, 6)))
 
 
 def failures(kind, seed, **settings):
@@ -39,7 +39,7 @@ def test_a_flip_is_by_an_approximate_symmetry():
     shown = demonstration()
     flipped = failures("flips", 1, rate=1.0)
     assert flipped.false.all()
-    for operation, T, seen in zip(shown.assembly.operations, shown.goals, flipped.goals, strict=True):
+    for operation, T, seen in zip(shown.assembly.operations, shown.poses, flipped.goals, strict=True):
         turns = approximate_symmetries(shown.assembly.solids[operation.main]).turns
         assert (np.abs(turns - pose.inverse(T) @ seen).max(axis=(1, 2)) < 1e-9).any()
 
@@ -49,7 +49,7 @@ def test_a_stale_pose_is_where_the_part_was_before():
     stale = failures("stale", 1, rate=1.0)
     mains = [operation.main for operation in shown.assembly.operations]
     assert mains[1] == mains[3]
-    assert_array_equal(stale.goals[3], shown.goals[1])
+    assert_array_equal(stale.goals[3], shown.poses[1])
     assert_array_equal(stale.goals[1], shown.start[mains[1]])
 
 
@@ -57,23 +57,23 @@ def test_swaps_exchange_two_views_of_like_parts():
     shown = demonstration()
     swapped = next(f for f in (failures("swaps", seed) for seed in range(99)) if f.false[0])
     assert shown.assembly.operations[2].main == "castle2"
-    assert_array_equal(swapped.goals[0], shown.goals[2])
-    assert_array_equal(swapped.goals[2], shown.goals[0])
+    assert_array_equal(swapped.goals[0], shown.poses[2])
+    assert_array_equal(swapped.goals[2], shown.poses[0])
 
 
 def test_an_error_along_the_ray_is_on_it():
     shown = demonstration()
     model = make_failures("rays", NOISE_LEVEL, rate=1.0)
-    off = failures("rays", 3, rate=1.0).goals[:, :3, 3] - shown.goals[:, :3, 3]
+    off = failures("rays", 3, rate=1.0).goals[:, :3, 3] - shown.poses[:, :3, 3]
     length = np.linalg.norm(off, axis=1)
     assert ((length >= 0.02) & (length <= 0.06)).all()
-    assert_allclose(np.cross(off, model.camera.rays(shown.goals)), 0.0, atol=1e-12)
+    assert_allclose(np.cross(off, model.camera.rays(shown.poses)), 0.0, atol=1e-12)
 
 
 def test_a_displaced_view_has_one_displacement():
     shown = demonstration()
     seen = failures("displaced-view", 5)
-    moved = (seen.goals @ pose.inverse(shown.goals))[seen.false]
+    moved = (seen.poses @ pose.inverse(shown.poses))[seen.false]
     assert len(moved) == 2
     assert_allclose(moved[0], moved[1], atol=1e-12)
 
@@ -83,8 +83,8 @@ def test_a_mixture_fails_in_several_ways():
     flips, rays = (PRESETS[name]._replace(rate=0.2) for name in ("flips", "rays"))
     mixed = CameraFailures(NOISE_LEVEL, (flips, rays))
     seen = [mixed.draw_false(shown, np.random.default_rng(seed)) for seed in range(300)]
-    turned = [np.abs(views.goals - shown.goals)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
-    shifted = [np.abs(views.goals - shown.goals)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
+    turned = [np.abs(views.goals - shown.poses)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
+    shifted = [np.abs(views.goals - shown.poses)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
     assert 0.15 < np.mean(turned) < 0.25
     assert np.mean(shifted) > 0.15
     assert observe(shown, mixed, np.random.default_rng(0)).outliers.gross == pytest.approx(0.4)
@@ -100,7 +100,7 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
         first = model.draw_false(shown, np.random.default_rng(seed))
         look = Looks(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
         seen = look(range(5))
-        near = np.linalg.norm(seen.goals[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
+        near = np.linalg.norm(seen.poses[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
         repeated += near[first.false].tolist()
     assert abs(np.mean(repeated) - repeat) < 0.1
 

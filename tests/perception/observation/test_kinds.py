@@ -38,7 +38,7 @@ def see(noise: Noise, seed: int, scene: scenes.Scene = CYCLE) -> Observation:
 
 
 def twists(seen: Observation, scene: scenes.Scene = CYCLE) -> Array:
-    return pose.log(pose.inverse(scene.goals) @ seen.goals)
+    return pose.log(pose.inverse(scene.goals) @ seen.poses)
 
 
 def test_the_default_camera_looks_at_the_middle_as_anisotropic_does() -> None:
@@ -81,7 +81,7 @@ def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     offsets = []
     turns = []
     for seed in range(600):
-        goals = see(noise, seed).goals
+        goals = see(noise, seed).poses
         F = camera.frames(CYCLE.goals)
         offsets.append(np.einsum("nji,nj->ni", F, goals[:, :3, 3] - CYCLE.goals[:, :3, 3]))
         w = pose.log(goals @ pose.inverse(CYCLE.goals))[:, 3:]
@@ -97,7 +97,7 @@ def test_what_a_camera_states_follows_from_what_it_saw() -> None:
     seen = see(noise, 1)
     sigma = np.array([2e-3 * noise.across] * 2 + [2e-3 * noise.along])
     turn = np.radians(2.0) * np.array([noise.tilt, noise.tilt, noise.about])
-    Q = np.swapaxes(seen.goals[:, :3, :3], 1, 2) @ noise.camera.frames(seen.goals)
+    Q = np.swapaxes(seen.poses[:, :3, :3], 1, 2) @ noise.camera.frames(seen.poses)
     assert_allclose(seen.covariance[:, :3, :3], Q @ np.diag(sigma**2) @ np.swapaxes(Q, 1, 2), rtol=1e-9, atol=1e-18)
     assert_allclose(seen.covariance[:, 3:, 3:], Q @ np.diag(turn**2) @ np.swapaxes(Q, 1, 2), rtol=1e-9, atol=1e-18)
 
@@ -127,7 +127,7 @@ def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
         rng.standard_normal((5, 6))
         gross.append(rng.random((5, 2))[:, 0] < OUTLIERS)
         unit.append(twists(made) / sigma)
-        seen.append(made.seen)
+        seen.append(made.observed)
     return np.concatenate(unit), np.concatenate(gross), np.concatenate(seen)
 
 
@@ -162,13 +162,13 @@ def test_inliers_have_the_stated_covariance_and_all_errors_the_declared_one() ->
 
 def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     """Move what is missed elsewhere: the observation stays the same, to the bit."""
-    seed = next(s for s in range(200) if not see(Outliers(NOISE_LEVEL), s).seen.all())
+    seed = next(s for s in range(200) if not see(Outliers(NOISE_LEVEL), s).observed.all())
     here = see(Outliers(NOISE_LEVEL), seed)
-    k = int(np.argmin(here.seen))
+    k = int(np.argmin(here.observed))
     goals = CYCLE.goals.copy()
     goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
     there = see(Outliers(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
-    assert here.goals.tobytes() == there.goals.tobytes()
+    assert here.poses.tobytes() == there.poses.tobytes()
     assert_array_equal(here.covariance, there.covariance)
     assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
 
@@ -186,10 +186,10 @@ def test_what_was_missed_stays_where_its_part_was_seen_last() -> None:
 
 def test_the_same_operations_are_missed_at_every_level_but_zero() -> None:
     for seed in range(60):
-        masks = [see(Outliers(NoiseLevel(mm, mm)), seed).seen for mm in (0.1, 1.0, 4.0)]
+        masks = [see(Outliers(NoiseLevel(mm, mm)), seed).observed for mm in (0.1, 1.0, 4.0)]
         assert_array_equal(masks[0], masks[1])
         assert_array_equal(masks[0], masks[2])
-        assert see(Outliers(NoiseLevel(0.0, 0.0), misses=1.0), seed).seen.all()
+        assert see(Outliers(NoiseLevel(0.0, 0.0), misses=1.0), seed).observed.all()
 
 
 def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,7 +206,7 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
     size = []
     for seed in range(400):
         seen = see(BiasView(NOISE_LEVEL), seed)
-        E = seen.goals @ pose.inverse(CYCLE.goals)
+        E = seen.poses @ pose.inverse(CYCLE.goals)
         middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
         assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
         size.append(pose.log(pose.inverse(middle) @ E[0] @ middle))
@@ -221,7 +221,7 @@ def test_errors_drift_from_operation_to_operation() -> None:
     for seed in range(800):
         seen = see(Correlated(NOISE_LEVEL), seed)
         xi = twists(seen)
-        R = seen.goals[:, :3, :3]
+        R = seen.poses[:, :3, :3]
         world.append(np.concatenate([np.einsum("nij,nj->ni", R, half) @ A for half in (xi[:, :3], xi[:, 3:])], axis=1))
     z = np.array(world) / np.repeat([2e-3, np.radians(2.0)], 3)
     for j in range(1, 5):
@@ -251,7 +251,7 @@ def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_er
     stated = []
     for seed in range(300):
         seen = see(Symmetric(NoiseLevel(1.0, 40.0)), seed)
-        off = pose.inverse(CYCLE.goals) @ seen.goals
+        off = pose.inverse(CYCLE.goals) @ seen.poses
         for k, operation in enumerate(CYCLE.assembly.operations):
             equal = off[k] @ symmetries(CYCLE.assembly.solids[operation.main])
             angles = np.linalg.norm(pose.log(equal)[:, 3:], axis=1)
@@ -266,12 +266,12 @@ def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated()
     """A part that looks the same after any turn; else its region covers more than it says."""
     scenario = load_scenario("nested_bushings")
     layout = draw_layout(scenario, np.random.default_rng(3), 0.0)
-    n = len(layout.goals)
-    shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    n = len(layout.poses)
+    shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     lengths = []
     for seed in range(300):
         seen = Symmetric(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(seen.goals) @ layout.goals)
+        xi = pose.log(pose.inverse(seen.poses) @ layout.poses)
         lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
     assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)
 
@@ -284,7 +284,7 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
         far = see(AnyTurn(NOISE_LEVEL), seed)
         for k, operation in enumerate(CYCLE.assembly.operations):
             group = symmetries(CYCLE.assembly.solids[operation.main])
-            off = np.abs(group - pose.inverse(near.goals[k]) @ far.goals[k]).max(axis=(1, 2))
+            off = np.abs(group - pose.inverse(near.poses[k]) @ far.poses[k]).max(axis=(1, 2))
             assert off.min() < 1e-12
             turns.add((operation.main, int(np.argmin(off))))
             Ad = pose.adjoint(group[int(np.argmin(off))])
@@ -301,10 +301,10 @@ def test_a_camera_is_rigid() -> None:
 def test_a_demonstration_without_operations_is_seen_as_one(name: str) -> None:
     empty = scenes.scene([scenes.table()], [], np.zeros((0, 4, 4)))
     demonstration = Demonstration(empty.assembly, empty.start, empty.goals, empty.start, np.zeros((0, 6, 6)))
-    assert observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0)).goals.shape == (0, 4, 4)
+    assert observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0)).poses.shape == (0, 4, 4)
 
 
 def test_everything_missed_is_an_observation_too() -> None:
     seen = see(Outliers(NOISE_LEVEL, misses=1.0), 0)
-    assert not seen.seen.any()
-    assert np.isfinite(seen.goals).all()
+    assert not seen.observed.any()
+    assert np.isfinite(seen.poses).all()

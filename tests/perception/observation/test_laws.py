@@ -48,9 +48,9 @@ class Draws(NamedTuple):
 def drawn(noise: Noise, trials: int = TRIALS) -> Draws:
     demonstration = scenes.shown(CYCLE)
     observations = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(trials)]
-    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([observation.goals for observation in observations]))
+    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([observation.poses for observation in observations]))
     L = np.linalg.cholesky(np.array([observation.covariance for observation in observations]))
-    seen = np.array([observation.seen for observation in observations], dtype=np.float64)
+    seen = np.array([observation.observed for observation in observations], dtype=np.float64)
     return Draws(np.linalg.solve(L, xi[..., None])[..., 0] * seen[..., None], seen)
 
 
@@ -99,9 +99,9 @@ class Cheat:
     def __call__(self, assembly: Any, shown: Demonstration, rng: np.random.Generator) -> Observation:
         seen = Isotropic(NOISE_LEVEL)(assembly, shown, rng)
         sigma = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))
-        unit = pose.log(pose.inverse(shown.goals) @ seen.goals) / sigma
+        unit = pose.log(pose.inverse(shown.poses) @ seen.poses) / sigma
         unit = self.factor * unit + self.offset * np.eye(6)[4] + self.skew * np.roll(unit, 1, axis=1)
-        return replace(seen, goals=shown.goals @ pose.exp(unit * sigma))
+        return replace(seen, poses=shown.poses @ pose.exp(unit * sigma))
 
 
 @cache
@@ -149,9 +149,9 @@ def test_the_choice_of_the_world_frame_does_not_count(name: str, monkeypatch: py
     for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
         with monkeypatch.context() as patch:
             there = in_another_world(CYCLE, name, W, patch)
-        assert_allclose(there.goals, W @ here.goals, atol=1e-12)
+        assert_allclose(there.poses, W @ here.poses, atol=1e-12)
         assert_allclose(there.covariance, here.covariance, rtol=1e-9, atol=1e-15)
-        assert_array_equal(there.seen, here.seen)
+        assert_array_equal(there.observed, here.observed)
 
 
 @pytest.mark.parametrize("name", STEADY)
@@ -163,9 +163,9 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
         rng = np.random.default_rng(2)
         seen.append(observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.5 * factor, 0.75 * factor)), rng))
         after.add(rng.random())
-    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.goals) for observation in seen)
-    assert_array_equal(seen[0].seen, seen[1].seen)
-    there = seen[0].seen
+    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.poses) for observation in seen)
+    assert_array_equal(seen[0].observed, seen[1].observed)
+    there = seen[0].observed
     assert there.any()
     assert_allclose(strong[there, 3:], 4.0 * weak[there, 3:], rtol=1e-6, atol=1e-9)
     lengths = [np.linalg.norm(xi[there, :3], axis=1) for xi in (weak, strong)]
@@ -179,8 +179,8 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
 def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
     for seed in range(40):
         seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.0, 0.0)), np.random.default_rng(seed))
-        assert seen.goals.tobytes() == CYCLE.goals.tobytes()
-        assert seen.seen.all()
+        assert seen.poses.tobytes() == CYCLE.goals.tobytes()
+        assert seen.observed.all()
         assert_allclose(seen.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
 
 
@@ -188,7 +188,7 @@ def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
 def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None:
     def made(seed: int) -> bytes:
         seen = observe(scenes.shown(CYCLE), make_noise(name, NOISE_LEVEL), np.random.default_rng(seed))
-        return seen.goals.tobytes() + seen.covariance.tobytes() + seen.seen.tobytes()
+        return seen.poses.tobytes() + seen.covariance.tobytes() + seen.observed.tobytes()
 
     assert made(1) == made(1)
     assert made(1) != made(2)
@@ -203,8 +203,8 @@ def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
         observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0))
         for demonstration in demonstrations
     )
-    assert_array_equal(loose.goals, plain.goals)
-    assert plain.seen[1]
+    assert_array_equal(loose.poses, plain.poses)
+    assert plain.observed[1]
     assert_allclose(loose.covariance - plain.covariance, human_error_scale, atol=1e-17)
 
 
@@ -213,12 +213,12 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     """A whole trial up to the robot: what `none` has it carry out are the model's goals for this seed, bit for bit."""
     scenario = load_scenario("carried_bridge")
     layout = draw_layout(scenario, stream(5, 0))
-    final = placements(scenario.assembly, layout.start, layout.goals)[-1]
+    final = placements(scenario.assembly, layout.start, layout.poses)[-1]
     n = len(scenario.assembly)
-    demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
+    demonstration = Demonstration(scenario.assembly, layout.start, layout.poses, final, np.zeros((n, 6, 6)))
     scene = object.__new__(Scene)
     vars(scene).update(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
-    simulated = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
+    simulated = SimulatedDemonstration(Layout(layout.poses, layout.start), demonstration)
     carried_out: list[Any] = []
 
     class Carried(Exception):
@@ -235,10 +235,10 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     with pytest.raises(Carried):
         trial.run_trial(spec, scene, simulated=simulated, content="any")
     expected = make_noise(name, NoiseLevel(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
-    assert expected.seen.all()
-    assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
-    assert carried_out[0].targets.tobytes() == expected.goals.tobytes()
-    assert np.abs(expected.goals - layout.goals).max() > 1e-4
+    assert expected.observed.all()
+    assert carried_out[0].goals.tobytes() == expected.poses.tobytes()
+    assert carried_out[0].targets.tobytes() == expected.poses.tobytes()
+    assert np.abs(expected.poses - layout.poses).max() > 1e-4
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -248,14 +248,14 @@ def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     for seed in range(40):
         seen = observe_demonstration(simulated, make_noise(name, NOISE_LEVEL), seed)
         planned = apply_method("uncorrected", seen, CYCLE.goals)
-        if seen.seen.all():
+        if seen.observed.all():
             assert planned.plan is not None
-            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
+            assert planned.plan.target_poses.tobytes() == seen.poses.tobytes()
         else:
             assert planned.plan is None
             assert planned.failure is not None
             assert planned.failure.code == "not_seen"
-            assert planned.failure.operation == int(np.argmin(seen.seen))
+            assert planned.failure.operation == int(np.argmin(seen.observed))
             assert not apply_method("contact", seen, CYCLE.goals).plan
 
 
@@ -266,7 +266,7 @@ def test_large_errors_stay_within_the_observations_of_the_environment(name: str)
     for seed in range(60):
         seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(40.0, 40.0)), np.random.default_rng(seed))
         assert (np.abs(seen.covariance) <= widest).all()
-        goals = packed(seen.goals)
+        goals = packed(seen.poses)
         assert np.abs(goals[:, :3]).max() <= ROOM_M
-        near = np.abs(seen.goals[:, :3, 3]).max(axis=1) <= ROOM_M
-        assert_allclose(goals[near], pose.pack(seen.goals[near]), atol=1e-15)
+        near = np.abs(seen.poses[:, :3, 3]).max(axis=1) <= ROOM_M
+        assert_allclose(goals[near], pose.pack(seen.poses[near]), atol=1e-15)

@@ -16,7 +16,7 @@ N = 5
 def demonstration():
     scenario = load_scenario("carried_bridge")
     layout = draw_layout(scenario, np.random.default_rng(0), 0.0)
-    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((N, 6, 6)), play_m=2e-4)
+    return Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((N, 6, 6)), play_m=2e-4)
 
 
 def looks(allowed, noise="isotropic", assembly=None):
@@ -50,7 +50,7 @@ def test_a_look_may_miss_and_err_as_the_first():
     missed = np.mean([~seen.seen for seen in observations])
     assert 0.0 < missed < 0.06  # 2 % of 500; 0.06 is 6 deviations above
     away = [
-        np.linalg.norm(seen.goals[seen.seen][:, :3, 3] - demonstration().goals[seen.seen][:, :3, 3])
+        np.linalg.norm(seen.poses[seen.seen][:, :3, 3] - demonstration().goals[seen.seen][:, :3, 3])
         for seen in observations
     ]
     assert max(away) > 5 * np.median(away)

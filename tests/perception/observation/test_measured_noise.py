@@ -81,9 +81,9 @@ def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     noise = make_noise(name, NOISE_LEVEL)
     demonstration = scenes.shown(TOWER)
     seen = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(draws)]
-    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.goals for observation in seen]))
+    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.poses for observation in seen]))
     L = np.linalg.cholesky(np.array([observation.covariance for observation in seen]))
-    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([observation.seen for observation in seen])
+    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([observation.observed for observation in seen])
 
 
 def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> None:
@@ -114,7 +114,7 @@ def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names:
     assert outliers - 0.06 < gross.mean() < outliers + 0.08
     clean = see(names[1], 0)
     dirty = see(names[0], 0)
-    assert np.trace(dirty.covariance[dirty.seen][0]) < 2.0 * np.trace(clean.covariance[0])
+    assert np.trace(dirty.covariance[dirty.observed][0]) < 2.0 * np.trace(clean.covariance[0])
     assert dirty.outliers is not None
     assert dirty.outliers.gross == pytest.approx(outliers)
 
@@ -126,9 +126,9 @@ def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) ->
     for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
         turned = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
         there = observe(scenes.shown(scenes.turned(TOWER, W)), turned, np.random.default_rng(3))
-        assert_allclose(there.goals, W @ here.goals, atol=1e-12)
+        assert_allclose(there.poses, W @ here.poses, atol=1e-12)
         assert_allclose(there.covariance, here.covariance, rtol=1e-9, atol=1e-15)
-        assert_array_equal(there.seen, here.seen)
+        assert_array_equal(there.observed, here.observed)
 
 
 def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
@@ -141,16 +141,16 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
             seen.append(observe(scenes.shown(TOWER), make_noise(names[0], noise_level), rng))
             after.add(rng.random())
         assert len(after) == 1
-        assert_array_equal(seen[0].seen, seen[1].seen)
+        assert_array_equal(seen[0].observed, seen[1].observed)
         weak, strong = (
-            pose.log(pose.inverse(TOWER.goals) @ observation.goals)[observation.seen] for observation in seen
+            pose.log(pose.inverse(TOWER.goals) @ observation.poses)[observation.observed] for observation in seen
         )
         lengths = [np.linalg.norm(xi[:, :3], axis=1) for xi in (weak, strong)]
         assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
         assert_allclose(strong[:, 3:], 2.0 * weak[:, 3:], rtol=1e-6, atol=1e-12)
         none = see(names[0], seed, NoiseLevel(0.0, 0.0))
-        assert none.goals.tobytes() == TOWER.goals.tobytes()
-        assert none.seen.all()
+        assert none.poses.tobytes() == TOWER.goals.tobytes()
+        assert none.observed.all()
         assert_allclose(none.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
 
 
@@ -169,11 +169,11 @@ def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]
     for seed in range(30):
         seen = see(names[0], seed)
         planned = apply_method("uncorrected", seen, TOWER.goals)
-        assert (planned.plan is not None) == bool(seen.seen.all())
+        assert (planned.plan is not None) == bool(seen.observed.all())
         if planned.plan is not None:
-            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
+            assert planned.plan.target_poses.tobytes() == seen.poses.tobytes()
         again = see(names[0], seed)
-        assert again.goals.tobytes() + again.covariance.tobytes() == seen.goals.tobytes() + seen.covariance.tobytes()
+        assert again.poses.tobytes() + again.covariance.tobytes() == seen.poses.tobytes() + seen.covariance.tobytes()
 
 
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
@@ -183,10 +183,10 @@ def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> N
     missed = 0
     for seed in range(60):
         seen = observe(demonstration, noise, np.random.default_rng(seed))
-        for k in np.flatnonzero(~seen.seen):
+        for k in np.flatnonzero(~seen.observed):
             missed += 1
             start = TOWER.start[TOWER.assembly.operations[k].main]
-            assert_array_equal(seen.goals[k], start)
+            assert_array_equal(seen.poses[k], start)
             assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNSEEN_DEVIATION)
     assert missed > 5
 
@@ -200,10 +200,10 @@ def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
     for seed in range(60):
         seen = see(f"empirical:{folder / 'whole.csv'}", seed, NoiseLevel(1.0, 1.0))
         F = camera.frames(TOWER.goals)
-        shift = np.einsum("nji,nj->ni", F, seen.goals[:, :3, 3] - TOWER.goals[:, :3, 3]) * 1e3
-        R = seen.goals[:, :3, :3] @ np.swapaxes(TOWER.goals[:, :3, :3], 1, 2)
+        shift = np.einsum("nji,nj->ni", F, seen.poses[:, :3, 3] - TOWER.goals[:, :3, 3]) * 1e3
+        R = seen.poses[:, :3, :3] @ np.swapaxes(TOWER.goals[:, :3, :3], 1, 2)
         turn = np.einsum("nji,nj->ni", F, Rotation.from_matrix(R).as_rotvec(degrees=True))
-        for d, w in zip(shift[seen.seen], turn[seen.seen], strict=True):
+        for d, w in zip(shift[seen.observed], turn[seen.observed], strict=True):
             straight = np.abs(rows - [*d, *w]).max(axis=1).min() < 1e-6
             opposite = np.abs(rows[:, 3:] + w).max(axis=1)
             k = int(np.argmin(opposite))
@@ -240,7 +240,7 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
         path.write_bytes((folder / f"{source}.csv").read_bytes())
         os.utime(path, ns=(i, i))
         hashed = config_hash(TrialConfig("stick_in_tower", noise=name), "content")
-        seen.append((see(name, 0).goals.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
+        seen.append((see(name, 0).poses.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
     assert all(first != second for first, second in zip(*seen, strict=True))
     assert noise_content("isotropic", "anisotropic", "package.module:name") == {}
 
@@ -269,9 +269,9 @@ def test_an_error_of_the_view_and_one_that_stays_come_back_from_a_file(tmp_path:
 def test_an_error_that_stays_is_taken_out_and_the_noise_of_the_file_stated() -> None:
     P = STAYS.frame
     right = see("camera", 1)
-    displaced = replace(right, goals=P @ pose.exp(STAYS.twist) @ pose.inverse(P) @ right.goals)
+    displaced = replace(right, poses=P @ pose.exp(STAYS.twist) @ pose.inverse(P) @ right.poses)
     clean = restated(displaced, CAMERA_NOISE, Camera())
-    assert_allclose(clean.goals, right.goals, atol=1e-12)
+    assert_allclose(clean.poses, right.poses, atol=1e-12)
     assert clean.tails is not None
     assert len(clean.shared) == 1
 

@@ -36,7 +36,7 @@ def see(noise: Noise, seed: int) -> Observation:
 
 def twists(seen: Observation, shown: Array) -> Array:
     """Body twists by which goals are wrong, (n, 6)."""
-    return pose.log(pose.inverse(shown) @ seen.goals)
+    return pose.log(pose.inverse(shown) @ seen.poses)
 
 
 def test_draws_differ_along_the_sight_and_across_it() -> None:
@@ -45,7 +45,7 @@ def test_draws_differ_along_the_sight_and_across_it() -> None:
     world = []
     for seed in range(1000):
         seen = see(Anisotropic(NOISE_LEVEL), seed)
-        R = seen.goals[:, :3, :3]
+        R = seen.poses[:, :3, :3]
         xi = twists(seen, TOWER.goals)
         world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
     for half, (along, across), sigma in zip(
@@ -64,8 +64,8 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
     worlds = []
     for scene in (TOWER, turned):
         seen = observe(scenes.shown(scene), Anisotropic(NOISE_LEVEL), np.random.default_rng(4))
-        R = np.zeros((len(seen.goals), 6, 6))
-        R[:, :3, :3] = R[:, 3:, 3:] = seen.goals[:, :3, :3]
+        R = np.zeros((len(seen.poses), 6, 6))
+        R[:, :3, :3] = R[:, 3:, 3:] = seen.poses[:, :3, :3]
         worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
     assert_allclose(worlds[1], worlds[0], atol=1e-15)
     assert_allclose(worlds[0], np.tile(worlds[0][0], (3, 1, 1)), atol=1e-15)

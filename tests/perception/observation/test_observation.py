@@ -24,7 +24,7 @@ def errors(noise_level: NoiseLevel, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
     rng = np.random.default_rng(11)
     demonstration = scenes.shown(TOWER)
-    seen = [Isotropic(noise_level)(demonstration.assembly, demonstration, rng).goals for _ in range(draws)]
+    seen = [Isotropic(noise_level)(demonstration.assembly, demonstration, rng).poses for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 
@@ -58,7 +58,7 @@ def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
     seen = observe(shown, Isotropic(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
     assert seen.assembly is shown.assembly
     assert dict(seen.start).keys() == dict(shown.start).keys()
-    assert seen.seen.tolist() == [True, True, True]
+    assert seen.observed.tolist() == [True, True, True]
     assert (seen.gap_m, seen.play_m) == (3e-4, 2e-4)
 
 
@@ -67,7 +67,7 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     rng = np.random.default_rng(0)
 
     def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        return scenes.seen(TOWER, shown.goals)
+        return scenes.seen(TOWER, shown.poses)
 
     assert make_noise("isotropic", noise_level) == Isotropic(noise_level)
     assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", noise_level) == Isotropic(
@@ -76,7 +76,7 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     assert make_noise(Isotropic, noise_level) == Isotropic(noise_level)
     assert make_noise(Isotropic(NoiseLevel(9.0, 9.0)), noise_level) == Isotropic(NoiseLevel(9.0, 9.0))
     assert make_noise(plain, noise_level) is plain
-    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).goals, TOWER.goals)
+    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.goals)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ SKEWED[1, 0, 1] = 1e-7
         (TOWER.goals, "returned ndarray; return an apo_bench.assembly.goals.Observation"),
         (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
         (replace(GOOD, start={}), "changed which parts have a start pose"),
-        (replace(GOOD, goals=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),
+        (replace(GOOD, poses=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),
         (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
     ],
 )

@@ -44,9 +44,9 @@ def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
     before = TOWER.goals.copy()
     seen = observe(SHOWN, make_noise(wrap(), NOISE_LEVEL), np.random.default_rng(4))
     up = np.random.default_rng(4).uniform(1e-3, 2e-3, 3)
-    assert_allclose(seen.goals[:, 2, 3] - TOWER.goals[:, 2, 3], up, atol=1e-15)
+    assert_allclose(seen.poses[:, 2, 3] - TOWER.goals[:, 2, 3], up, atol=1e-15)
     assert_allclose(seen.covariance, np.tile(np.diag(np.repeat([2e-3, np.radians(0.5)], 3) ** 2), (3, 1, 1)))
-    assert seen.seen.all()
+    assert seen.observed.all()
     assert_array_equal(TOWER.goals, before)
 
 
@@ -58,7 +58,7 @@ def test_what_is_declared_as_nothing_is_stated_as_the_floor_and_carelessness_is_
     expected = np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1))
     expected[1, 1, 1] = 0.003**2
     assert_allclose(seen.covariance, expected, rtol=1e-9, atol=1e-20)
-    assert seen.goals.tobytes() == TOWER.goals.tobytes()
+    assert seen.poses.tobytes() == TOWER.goals.tobytes()
 
 
 def test_a_class_made_with_a_level_may_be_plain_too() -> None:
@@ -184,7 +184,7 @@ def test_a_card_says_what_its_level_means(given: object, noise_level: NoiseLevel
 def test_no_level_reaches_a_plain_function() -> None:
     for noise_level in (NoiseLevel(0.0, 0.0), NoiseLevel(5.0, 5.0)):
         seen = observe(SHOWN, make_noise(with_deviations(lifted, 2.0, 0.5), noise_level), np.random.default_rng(4))
-        assert (seen.goals[:, 2, 3] > TOWER.goals[:, 2, 3] + 1e-3).all()
+        assert (seen.poses[:, 2, 3] > TOWER.goals[:, 2, 3] + 1e-3).all()
 
 
 @pytest.mark.filterwarnings("error")

@@ -80,7 +80,7 @@ def test_what_is_told_wrongly_is_noticed() -> None:
         wrong = Shifted(1e-3)(scene.assembly, scene.start, scene.goals, np.random.default_rng(seed))
         if any(c.environment.face == "bore_shifted" for _, c in contacts(wrong)):
             made = correct(replace(seen, assembly=wrong), "contact")
-            assert np.linalg.norm(made.goals[:, :3, 3] - scene.goals[:, :3, 3], axis=1).max() > 1e-4
+            assert np.linalg.norm(made.poses[:, :3, 3] - scene.goals[:, :3, 3], axis=1).max() > 1e-4
             return
     raise AssertionError("no bore was shifted")
 

@@ -117,18 +117,18 @@ def test_a_plan_has_the_relations_that_its_planner_was_given() -> None:
     scene = scenes.stick_in_tower()
     seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 1.0, 1.0))
     wrong = with_contacts(seen, Shifted(3e-3), scene.goals, stream(4, CONTACT_SOURCE))
-    assert wrong.goals.tobytes() == seen.goals.tobytes()
+    assert wrong.poses.tobytes() == seen.poses.tobytes()
     for method in ("oracle", "uncorrected"):
         with_wrong = apply_method(method, wrong, scene.goals)
         without = apply_method(method, seen, scene.goals)
         assert with_wrong.plan is not None
         assert without.plan is not None
-        assert with_wrong.plan.goals.tobytes() == without.plan.goals.tobytes()
+        assert with_wrong.plan.target_poses.tobytes() == without.plan.target_poses.tobytes()
     heard: list[Observation] = []
 
     def listens(observation: Observation) -> object:
         heard.append(observation)
-        return observation.goals
+        return observation.poses
 
     plan = apply_method(listens, wrong, scene.goals)
     assert heard == [wrong]

@@ -107,14 +107,14 @@ def test_contact_corrects_it(scenario: Scenario) -> None:
     assembly = scenario.assembly
     rng = np.random.default_rng(3)
     layout = draw_layout(scenario, rng)
-    final = placements(assembly, layout.start, layout.goals)[-1]
+    final = placements(assembly, layout.start, layout.poses)[-1]
     human_error_scale = np.zeros((len(assembly), 6, 6))
-    shown = Demonstration(assembly, layout.start, layout.goals, final, human_error_scale, play_m=2.5e-4)
+    shown = Demonstration(assembly, layout.start, layout.poses, final, human_error_scale, play_m=2.5e-4)
     seen = observe(shown, "isotropic", rng)
     correction = correct(seen, "contact")
     assert correction.status == "converged"
-    assert goal_errors(assembly, layout.start, layout.goals, seen.goals)[0] > 0.3
-    assert goal_errors(assembly, layout.start, layout.goals, correction.goals)[0] < 0.02
+    assert goal_errors(assembly, layout.start, layout.poses, seen.poses)[0] > 0.3
+    assert goal_errors(assembly, layout.start, layout.poses, correction.poses)[0] < 0.02
 
 
 @pytest.mark.parametrize("name", ["generated:grooves:2", "generated:rods:0", "generated:rods:2", "generated:castles:2"])

@@ -103,7 +103,7 @@ def _title(log: Log, scenario: Scenario | None) -> str:
 def _path_ends(recording: ImportedRecording) -> Iterator[tuple[str, str, Array]]:
     for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
         if end is not None:
-            goal = recording.observation.goals[k]
+            goal = recording.observation.poses[k]
             ends = np.array([goal[:3, 3] - end.length_m * goal[:3, :3] @ end.direction, goal[:3, 3]])
             part = recording.scenario.assembly.operations[k].main
             yield part, f"{k + 1}: {macro}, {off_deg:.0f} deg off", ends

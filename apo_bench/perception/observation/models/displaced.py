@@ -19,7 +19,7 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
-    goals = displaced(demonstration.goals, xi)
+    goals = displaced(demonstration.poses, xi)
     stated = floored(covariance + demonstration.human_error_covariance)
     return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
@@ -45,14 +45,14 @@ def observe_shared(
         shared: The goals that are seen, (n, 4, 4) -> what operations share.
     """
     seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
-    return with_shared(seen, *shared(seen.goals)) if own.any() else seen
+    return with_shared(seen, *shared(seen.poses)) if own.any() else seen
 
 
 def with_shared(observation: Observation, *shared: SharedError) -> Observation:
     """An observation that states, beside what it states already, errors that operations share."""
     stated = np.array(observation.covariance)
     for error in shared:
-        stated[list(error.operations)] += error.added(observation.goals)
+        stated[list(error.operations)] += error.added(observation.poses)
     return replace(observation, covariance=stated, shared=(*observation.shared, *shared))
 
 

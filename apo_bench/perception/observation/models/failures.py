@@ -111,16 +111,16 @@ class CameraFailures:
 
     def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
         """What a first look has wrong: the first draws of `__call__`."""
-        goals = demonstration.goals.copy()
+        goals = demonstration.poses.copy()
         if max(self.noise_level) > 0.0 and len(goals):
             for failure in self.failures:
                 failure.displace(goals, demonstration, self.camera, failure.rate, rng)
-        return FalseViews(np.abs(goals - demonstration.goals).max(axis=(1, 2), initial=0.0) > 0.0, goals)
+        return FalseViews(np.abs(goals - demonstration.poses).max(axis=(1, 2), initial=0.0) > 0.0, goals)
 
     def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
         sigma = self.noise_level.sigma()
         xi = rng.standard_normal((len(views.goals), 6)) * sigma
-        seeming = replace(demonstration, goals=views.goals)
+        seeming = replace(demonstration, poses=views.goals)
         seen = observe_displaced(demonstration.assembly, seeming, xi, np.diag(sigma**2))
         x, y, z = self.camera.T_world_camera[:3, 3].tolist()
         gross = min(1.0, sum(failure.rate for failure in self.failures))
@@ -144,7 +144,7 @@ def _flip(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 def _leave_behind(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen where they were before the operation moved them."""
-    before = (shown.start, *placements(shown.assembly, shown.start, shown.goals))
+    before = (shown.start, *placements(shown.assembly, shown.start, shown.poses))
     for k in draw_failing(len(goals), rate, rng):
         goals[k] = before[k][shown.assembly.operations[k].main]
 
@@ -161,7 +161,7 @@ def _swap(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
         like = [i for i in others if assembly.solids[parts[i]] is assembly.solids[parts[k]]] or others
         if starts and k in free and like:
             i = like[int(rng.integers(len(like)))]
-            goals[[k, i]] = shown.goals[[i, k]]
+            goals[[k, i]] = shown.poses[[i, k]]
             free -= {i, k}
 
 

@@ -123,7 +123,7 @@ class Fitted:
             self.camera, self.noise_level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
         tails = (
-            stated_tails(measured, self.noise_level, self.camera, seen.goals) if min(self.noise_level) > 0.0 else None
+            stated_tails(measured, self.noise_level, self.camera, seen.poses) if min(self.noise_level) > 0.0 else None
         )
         seen = replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
         return seen if measured.view is None else self._displaced(seen, rng.standard_normal(6))
@@ -131,12 +131,12 @@ class Fitted:
     def _displaced(self, seen: Observation, unit: Array) -> Observation:
         """What is seen if the whole view is off as well."""
         sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.noise_level, 3)
-        if not sigma.any() or not len(seen.goals):
+        if not sigma.any() or not len(seen.poses):
             return seen
         # E = P exp(e) P^-1 displaces all that is seen alike, about the middle of it.
-        P = view_frame(self.camera, [seen.goals])
-        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.goals
-        return with_shared(replace(seen, goals=goals), view_error(self.camera, goals, sigma))
+        P = view_frame(self.camera, [seen.poses])
+        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.poses
+        return with_shared(replace(seen, poses=goals), view_error(self.camera, goals, sigma))
 
 
 def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
@@ -144,15 +144,15 @@ def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) 
 
     Covariances that it stated itself are not looked at, but for those of operations that were not seen.
     """
-    goals = np.array(observation.goals)
+    goals = np.array(observation.poses)
     if measured.constant is not None:
         # T_seen = P exp(c) P^-1 T, so T = P exp(-c) P^-1 T_seen.
         P = measured.constant.frame
         goals = P @ pose.exp(-measured.constant.twist) @ pose.inverse(P) @ goals
     stated = floored(camera.covariance(goals, Fitted(measured, _AS_MEASURED, camera).covariance))
-    stated = np.where(observation.seen[:, None, None], stated, observation.covariance)
+    stated = np.where(observation.observed[:, None, None], stated, observation.covariance)
     tails = stated_tails(measured, _AS_MEASURED, camera, goals)
-    seen = replace(observation, goals=goals, covariance=stated, shared=(), tails=tails)
+    seen = replace(observation, poses=goals, covariance=stated, shared=(), tails=tails)
     if measured.view is None or not any(measured.view) or not len(goals):
         return seen
     return with_shared(seen, view_error(camera, goals, np.repeat(measured.view, 3) * LEVEL_UNITS))
@@ -219,15 +219,15 @@ def observe_in_ray_frames(
         missed: (n,), what nothing is found for.
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)
-    xi = camera.twists(demonstration.goals, errors * scale)
-    stated = camera.covariance(displaced(demonstration.goals, xi), covariance * np.outer(scale, scale))
+    xi = camera.twists(demonstration.poses, errors * scale)
+    stated = camera.covariance(displaced(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(noise_level) > 0.0)
-    goals = seen.goals.copy()
+    goals = seen.poses.copy()
     stated = seen.covariance.copy()
     goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
-    return replace(seen, goals=goals, covariance=stated, seen=~missed)
+    return replace(seen, poses=goals, covariance=stated, observed=~missed)
 
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:

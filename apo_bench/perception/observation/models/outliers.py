@@ -67,12 +67,12 @@ class Outliers:
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
-        goals = seen.goals.copy()
+        goals = seen.poses.copy()
         covariance = seen.covariance.copy()
         goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
-        return replace(seen, goals=goals, covariance=covariance, seen=~missed, outliers=stated)
+        return replace(seen, poses=goals, covariance=covariance, observed=~missed, outliers=stated)
 
 
 def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:

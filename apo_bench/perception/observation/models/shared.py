@@ -83,7 +83,7 @@ class BiasView:
         own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
         if not len(assembly):
             return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
-        view = pose.adjoint(pose.inverse(demonstration.goals) @ view_frame(self.camera, [demonstration.goals]))
+        view = pose.adjoint(pose.inverse(demonstration.poses) @ view_frame(self.camera, [demonstration.poses]))
 
         def shared(goals: Array) -> list[SharedError]:
             return [view_error(self.camera, goals, sigma)]
@@ -120,8 +120,8 @@ class Correlated:
         # From the axes of the camera into those of the part: the turn by R^t as it is, the shift by R^t as it is seen.
         in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
         xi = np.zeros((len(assembly), 6))
-        xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], in_world[:, 1])
-        R_seen = (demonstration.goals @ pose.exp(xi))[:, :3, :3]
+        xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], in_world[:, 1])
+        R_seen = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
         xi[:, :3] = np.einsum("nji,nj->ni", R_seen, in_world[:, 0])
 
         def shared(goals: Array) -> list[SharedError]:

@@ -63,8 +63,8 @@ class Anisotropic:
         place = self.noise_level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
         turn = np.radians(self.noise_level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
         rotation = np.zeros((len(assembly), 6))
-        rotation[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], unit[:, 3:] @ turn)
-        R = (demonstration.goals @ pose.exp(rotation))[:, :3, :3]
+        rotation[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], unit[:, 3:] @ turn)
+        R = (demonstration.poses @ pose.exp(rotation))[:, :3, :3]
         xi = np.concatenate([np.einsum("nji,nj->ni", R, unit[:, :3] @ place), rotation[:, 3:]], axis=1)
         covariance = np.zeros((len(assembly), 6, 6))
         covariance[:, :3, :3] = _in_body(R, place @ place)
@@ -113,8 +113,8 @@ class Sighted:
         mm = self.noise_level.mm * 1e-3
         rad = np.radians(self.noise_level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
-        xi = self.camera.twists(demonstration.goals, rng.standard_normal((len(assembly), 6)) * sigma)
-        stated = self.camera.covariance(displaced(demonstration.goals, xi), np.diag(sigma**2))
+        xi = self.camera.twists(demonstration.poses, rng.standard_normal((len(assembly), 6)) * sigma)
+        stated = self.camera.covariance(displaced(demonstration.poses, xi), np.diag(sigma**2))
         return observe_displaced(assembly, demonstration, xi, stated)
 
 

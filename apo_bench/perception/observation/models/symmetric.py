@@ -118,7 +118,7 @@ class AnyTurn:
         g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
         Ad = pose.adjoint(pose.inverse(g))
         C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)
-        return replace(seen, goals=seen.goals @ g, covariance=(C + np.swapaxes(C, 1, 2)) / 2)
+        return replace(seen, poses=seen.poses @ g, covariance=(C + np.swapaxes(C, 1, 2)) / 2)
 
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:

@@ -75,7 +75,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
     rest = scene.kinematics.forward(scene.arm.home)[:3, :3]
     patch = _lowest(_boxes(scene))
     point = patch.mean(axis=0)
-    middle = plan.goals[:, :2, 3].mean(axis=0)
+    middle = plan.target_poses[:, :2, 3].mean(axis=0)
     to_face = pose.inverse(T @ plane_frame(face))
 
     def at(radius: float, k: int) -> TouchPlace | None:
