@@ -190,10 +190,10 @@ def episode_values(item: Item, off: float) -> dict[str, Any]:
     env = gymnasium.make(item.case, scenario=item.scenario, **asked)
     try:
         seen, info = env.reset(seed=item.seed)
-        values = flat({"0": {"seen": seen, "info": info}})
+        values = flat({"0": {"observed": seen, "info": info}})
         for k, action in enumerate(actions_of(item.case, len(scenario.assembly), item.seed), 1):
             seen, reward, ended, cut, info = env.step(action)
-            step = {str(k): {"seen": seen, "reward": reward, "ended": ended, "cut": cut, "info": info}}
+            step = {str(k): {"observed": seen, "reward": reward, "ended": ended, "cut": cut, "info": info}}
             if k % 10 == 0 or k < 10 or ended or cut:
                 values |= flat(step)
             if ended or cut:
