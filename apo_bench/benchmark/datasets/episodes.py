@@ -23,7 +23,7 @@ _OF_ROW = MappingProxyType(
         "seed": "number of the trial",
         "method": "what made the plan",
         "noise": "model of the camera",
-        "noise_level": "of the noise, mm",
+        "noise_mm": "of the noise, mm",
         "noise_deg": "of the noise, degrees",
         "human_error_scale": "0 for a careful human, 1 for the scenario's",
         "success": "whether the assembly is right at the end; the judge's word",

@@ -157,7 +157,7 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     measured = ["replay", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
     late = json.loads(capsys.readouterr().out)
-    assert (late["failure_code"], late["noise"], late["noise_level"]) == ("time_limit", "measured", None)
+    assert (late["failure_code"], late["noise"], late["noise_mm"]) == ("time_limit", "measured", None)
 
 
 def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
