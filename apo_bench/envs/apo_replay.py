@@ -73,7 +73,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     ## Starting State
     The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
-    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial, which is
+    sweeps and of `apo-bench run --seed k`, whatever came before; `reset()` draws the number of a trial, which is
     `env.unwrapped.trial` and never in `info`: whoever sees it can draw the truth. The parts stand where the
     demonstration began.
 
@@ -92,7 +92,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
     ## Arguments
-    - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
+    - `scenario`: a name (`apo-bench scenario list`), the path of a scenario file, or a `Scenario`.
     - `noise_level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
     - `human_error_scale`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
     - `noise`: a noise model by name, as `module:name`, or the object; None stands for `isotropic`.

@@ -1,4 +1,4 @@
-"""What `apo-bench recognise` found, as a table, in sentences and as JSON."""
+"""What `apo-bench detect-contacts` found, as a table, in sentences and as JSON."""
 
 from math import degrees
 from typing import Any

@@ -114,7 +114,7 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
 
 
 def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
-    """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
+    """Zeros, corrected, are method `paper` of `apo-bench run --seed`."""
     row = run_trial(TrialConfig("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
     assert row["success"] is True
     _check_episode(apo_bench.Corrected(small, "paper"), row)

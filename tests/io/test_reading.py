@@ -168,7 +168,16 @@ def test_text_of_another_syntax_is_refused(text: str, syntax: Any, words: str) -
 @pytest.mark.skipif(sys.platform != "linux", reason="the devices have these names on Linux")
 def test_the_command_line_does_not_wait_for_its_input() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "apo_bench.cli.app", "graph", "stick_in_tower", "--observation", "/dev/stdin"],
+        [
+            sys.executable,
+            "-m",
+            "apo_bench.cli.app",
+            "inspect",
+            "graph",
+            "stick_in_tower",
+            "--observation",
+            "/dev/stdin",
+        ],
         stdin=subprocess.PIPE,
         capture_output=True,
         text=True,
