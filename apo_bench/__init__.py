@@ -19,10 +19,10 @@ import gymnasium
 
 __version__ = "0.1.0"
 
-gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
+gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay", max_episode_steps=1)
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
-gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert")
-gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble")
+gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert", max_episode_steps=200)
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=1000)
 
 _EXPORTS = MappingProxyType(
     {
