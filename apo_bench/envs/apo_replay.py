@@ -22,8 +22,8 @@ from apo_bench.envs.episode import (
     verdicts,
 )
 from apo_bench.envs.rendering import FPS, MODES, Rendering
-from apo_bench.envs.spaces import Action, Seen, action_space, observation_entries, moved, observation_space
 from apo_bench.envs.robot import RobotSettings, execute_plan
+from apo_bench.envs.spaces import Action, Seen, action_space, moved, observation_entries, observation_space
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.looking import Looks

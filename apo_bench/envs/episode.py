@@ -1,6 +1,6 @@
 """One episode of an environment: its settings, its scene, its observation, and what `info` says at its end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 

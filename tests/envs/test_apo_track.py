@@ -50,7 +50,7 @@ def test_an_operation_is_shown_when_the_one_before_is_done(env: APOTrack) -> Non
     np.testing.assert_array_equal(first["poses"][1:], [[0, 0, 0, 1, 0, 0, 0]] * 2)
     assert not first["covariance"][1:].any()
     assert not first["observed"][1:].any()
-    assert len(env.tracked.seen.poses) == 1
+    assert len(env.tracked.observation.poses) == 1
     second, reward, *over, info = act(env, DO)
     assert (second["shown"].tolist(), second["done"].tolist()) == ([1, 1, 0], [1, 0, 0])
     assert (reward, over, info["action_mask"].tolist()) == (0.0, [False, False], [1, 1, 1])
@@ -103,7 +103,7 @@ def test_the_corrector_of_the_paper_is_a_policy(name: str) -> None:
     env = APOTrack(name, replay=False)
     for seed in range(2):
         env.reset(seed=seed)
-        asked = correct(env._base.seen, "paper-track")
+        asked = correct(env._base.observation, "paper-track")
         reward, info = follow(env, paper_track_policy)
         assert (reward, info["code"], asked.status) == (1.0, "ok", "converged")
         assert env.schedule == asked.schedule
