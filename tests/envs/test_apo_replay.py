@@ -23,7 +23,7 @@ from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObser
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialConfig, correct, run_trial
 from apo_bench.assembly import Outcome, Step
-from apo_bench.envs import episode, starts
+from apo_bench.envs import episode, robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
@@ -295,7 +295,7 @@ def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.Monk
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()
-    monkeypatch.setattr(starts, "LONGEST_REPLAY_S", 5.0)
+    monkeypatch.setattr(robot, "LONGEST_REPLAY_S", 5.0)
     watched.reset(seed=SEED)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
@@ -453,7 +453,7 @@ def test_a_picture_without_a_display(small: APOReplay) -> None:
 
 def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    true = starts.replay_and_judge
+    true = robot.replay_and_judge
 
     def replay_and_judge(*args: Any, **more: Any) -> Any:
         asked.append(args[4])

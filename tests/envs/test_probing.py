@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import TrialConfig
-from apo_bench.envs import starts
+from apo_bench.envs import robot as env_robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
@@ -22,7 +22,7 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
         given.append((probing, spiral or plain[-1] is True))
         raise InterruptedError
 
-    for where in (starts, trial):
+    for where in (robot, trial):
         monkeypatch.setattr(where, "replay_and_judge", noted)
     settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
     env = Corrected(APOReplay(SCENARIO, probe=True, **settings))
@@ -48,7 +48,7 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
         given.append((named["probing"], named["searches"]))
         raise InterruptedError
 
-    monkeypatch.setattr(starts, "replay_and_judge", noted)
+    monkeypatch.setattr(robot, "replay_and_judge", noted)
     env = APOReplay(SCENARIO, ft_sensor="joint-torque", assumed_robot_error="unknown")
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
