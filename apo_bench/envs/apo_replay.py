@@ -15,8 +15,8 @@ from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, m
 from apo_bench.envs.starts import RobotSettings, carried_out
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import (
     DEPTH_CAMERA,
     USUAL,
@@ -194,7 +194,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._current("nothing was seen").seen
 
     @property
-    def look(self) -> Looks | None:
+    def look(self) -> Reobservations | None:
         """Sees operations of this episode again, as often as `max_reobservations` says; None if it says 0.
 
         Raises:
