@@ -13,7 +13,7 @@ SETTINGS: dict[str, str] = {}
 """Settings of trials, arguments of environments and columns of records: neutral name -> name today."""
 VALUES: dict[str, str] = {}
 """Values of settings, and correctors."""
-EXPORTS = {"detect_contacts": "recognise"}
+EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
 KEYS = {
     "seen_again": "reobservations",

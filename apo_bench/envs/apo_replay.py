@@ -26,8 +26,8 @@ from apo_bench.envs.robot import RobotSettings, execute_plan
 from apo_bench.envs.spaces import Action, Seen, action_space, moved, observation_entries, observation_space
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import (
     DEPTH_CAMERA,
     USUAL,
@@ -202,7 +202,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._current("nothing was observed").observation
 
     @property
-    def reobserve(self) -> Looks | None:
+    def reobserve(self) -> Reobservations | None:
         """Observes operations of this episode again, `max_reobservations` times; None if that is 0.
 
         Raises:

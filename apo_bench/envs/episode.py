@@ -9,8 +9,8 @@ import numpy as np
 from apo_bench.assembly import Observation, Outcome
 from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import Predicted, check, noise_pair
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
@@ -50,7 +50,7 @@ class Episode:
     simulated: SimulatedDemonstration
     """Without its images."""
     observation: Observation
-    reobserve: Looks | None
+    reobserve: Reobservations | None
     """None where no reobservation is allowed."""
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from apo_bench import TrialConfig
-from apo_bench.envs import robot as env_robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
