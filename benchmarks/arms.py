@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import wilson
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from benchmarks.made_with import mujoco_of, with_mujoco
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "arms.md"
@@ -51,7 +51,7 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folders", nargs="+", type=Path)
     folders = asked.parse_args().folders
-    rows = [row for folder in folders for row in read_rows(folder)]
+    rows = [row for folder in folders for row in read_records(folder)]
     written = page([row for row in rows if row["success"] is not None])
     PAGE.write_text(with_mujoco(written, mujoco_of(folders)), encoding="utf-8")
     print(f"Wrote {PAGE}")

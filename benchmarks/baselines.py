@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 
 KEPT = Path(__file__).parent / "results" / "baselines.csv"
 
@@ -43,7 +43,7 @@ class Count(NamedTuple):
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folder", type=Path)
-    counts = counted(read_rows(asked.parse_args().folder))
+    counts = counted(read_records(asked.parse_args().folder))
     with KEPT.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, *Count._fields])

@@ -36,7 +36,7 @@ from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from benchmarks.failures_page import write
 
 

@@ -35,6 +35,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.probing.feeling import ACTS
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
+from apo_bench.trial.run import noise_of, probing_config
 from apo_bench.trial.stages import (
     WRENCH,
     SimulatedDemonstration,
@@ -46,7 +47,6 @@ from apo_bench.trial.stages import (
     stream_key,
     trial_outcome,
 )
-from apo_bench.trial.trial import noise_of, probing_config
 
 SWEEP = Path(__file__).with_name("robot_errors.toml")
 METHODS = ("contact+probe", "oracle+probe")

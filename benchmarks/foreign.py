@@ -42,8 +42,8 @@ from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.parts import load_part
+from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of
-from apo_bench.trial.trial import run_trial
 from benchmarks.foreign_table import METHODS, came_to, page, table
 
 HALVES = ("open", "held out")

@@ -17,7 +17,7 @@ def mujoco_of(folders: Iterable[Path]) -> list[str]:
 def states_of_code(folders: Iterable[Path]) -> int:
     """How many states of the package these sweeps were made with."""
     runs = [json.loads((folder / "run.json").read_text(encoding="utf-8")) for folder in folders]
-    return len({json.dumps(run["code"], sort_keys=True) for run in runs})
+    return len({json.dumps([run["versions"], run.get("code") or run.get("revision")], sort_keys=True) for run in runs})
 
 
 def said_by(page: str) -> list[str]:

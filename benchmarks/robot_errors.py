@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import Cell, tally, wilson
 from apo_bench.records import TrialConfig, TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from benchmarks.feel_acts import Line, lines_of, table
 from benchmarks.made_with import mujoco_of, states_of_code, with_mujoco
 
@@ -75,7 +75,7 @@ def main() -> None:
     asked.add_argument("--acts", type=Path, metavar="FILE", help="of benchmarks/feel_acts.py")
     given = asked.parse_args()
     folders = given.folders
-    rows = [row for folder in folders for row in read_rows(folder)]
+    rows = [row for folder in folders for row in read_records(folder)]
     acts = [] if given.acts is None else lines_of(given.acts)
     simulated = {*mujoco_of(folders), *(line["mujoco"] for line in acts)}
     states = states_of_code(folders)

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import tango, wilson
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from benchmarks.asked import ROBUST, block
 from benchmarks.made_with import mujoco_of, with_mujoco
 
@@ -56,7 +56,7 @@ def main() -> None:
     asked.add_argument("folders", nargs="+", type=Path)
     asked.add_argument("--trials", type=int, help="the first so many seeds only")
     given = asked.parse_args()
-    rows = [row for folder in given.folders for row in read_rows(folder) if row["success"] is not None]
+    rows = [row for folder in given.folders for row in read_records(folder) if row["success"] is not None]
     rows = [row for row in rows if given.trials is None or row["seed"] < given.trials]
     cells = counted(rows)
     with KEPT.open("w", encoding="utf-8", newline="") as file:

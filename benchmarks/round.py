@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.benchmark.analysis import wilson
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from benchmarks.asked import ROUND, block
 from benchmarks.made_with import mujoco_of, with_mujoco
 
@@ -79,7 +79,7 @@ def main() -> None:
 
 def judged(folders: Iterable[Path]) -> list[TrialRecord]:
     """Rows with a verdict, each trial once."""
-    rows = {(place_of(row), row["seed"]): row for folder in folders for row in read_rows(folder)}
+    rows = {(place_of(row), row["seed"]): row for folder in folders for row in read_records(folder)}
     return [row for row in rows.values() if row["success"] is not None]
 
 

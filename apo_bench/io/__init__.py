@@ -24,25 +24,19 @@ from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.io.result_files import (
     check_folders,
     check_target,
-    is_there,
     open_to_append,
-    put_back,
     replace_file,
     write_file,
 )
 from apo_bench.io.safe_io import decoded, each_line, opened, read_bytes, read_text
 from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
 from apo_bench.io.streams import redirect_output
-from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.io.words import columns, direction, listed_words, with_article
 
 __all__ = (
     "CONTROL",
-    "HALF_BUT_OF_FILES",
-    "HALF_LETTER",
     "SAFE_PATH",
     "UNSHOWN",
-    "WHOLE_LETTERS",
     "Columns",
     "CsvRow",
     "Finite",
@@ -67,10 +61,7 @@ __all__ = (
     "each_line",
     "environment",
     "grouped",
-    "half_letter",
     "has_parquet",
-    "is_there",
-    "is_whole",
     "listed_words",
     "load_matplotlib",
     "markdown",
@@ -78,7 +69,6 @@ __all__ = (
     "open_to_append",
     "opened",
     "parse_json",
-    "put_back",
     "read_bytes",
     "read_csv",
     "read_json",
@@ -86,7 +76,6 @@ __all__ = (
     "read_text",
     "read_toml",
     "read_typed",
-    "read_whole",
     "redirect_output",
     "replace_file",
     "save_figure",

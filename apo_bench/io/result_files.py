@@ -6,7 +6,6 @@ records of a sweep, which are appended line by line (`open_to_append`).
 
 import os
 import secrets
-import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -81,35 +80,6 @@ def open_to_append(path: Path) -> IO[bytes]:
     """
     check_target(path)
     return open(path, "a+b", buffering=0, opener=_unlinked)
-
-
-def is_there(file: IO[bytes], path: Path) -> bool:
-    """Whether an open file stands where it was opened."""
-    try:
-        return os.path.samestat(os.fstat(file.fileno()), path.stat())
-    except OSError:
-        return False
-
-
-def put_back(file: IO[bytes], path: Path) -> IO[bytes]:
-    """Write what an open file holds to a new one that replaces the file at `path`, if there is one.
-
-    Args:
-        file: Of `open_to_append`; it is not closed.
-
-    Returns:
-        The new file, as `open_to_append` opens it.
-
-    Raises:
-        InputError: As `replace_file`.
-        OSError: Its folder cannot be made.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replace_file(path) as copy:
-        file.seek(0)
-        shutil.copyfileobj(file, copy)
-        copy.flush()
-        return open_to_append(Path(copy.name))
 
 
 def check_target(path: Path) -> None:

@@ -9,7 +9,7 @@ from apo_bench import TrialConfig
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
-from apo_bench.trial import trial
+from apo_bench.trial import run
 
 SCENARIO = "block_on_block"
 
@@ -29,7 +29,7 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))
     with pytest.raises(InterruptedError):
-        trial.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
+        run.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
     (ours, spiral), (theirs, also_searches) = given
     assert spiral
     assert also_searches

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError
-from apo_bench.io import open_to_append, put_back, replace_file, write_file
+from apo_bench.io import open_to_append, replace_file, write_file
 
 
 def names(folder: Path) -> list[str]:
@@ -122,18 +122,3 @@ def test_permissions_are_those_of_the_old_file(tmp_path: Path) -> None:
         os.umask(before)
     write_file(path, "four", over=False)
     assert path.read_text() == "three"
-
-
-def test_an_open_file_that_was_removed_is_put_back_and_goes_on(tmp_path: Path) -> None:
-    path = tmp_path / "deep" / "a.jsonl"
-    path.parent.mkdir()
-    file = open_to_append(path)
-    file.write(b"one\n")
-    path.unlink()
-    path.parent.rmdir()
-    again = put_back(file, path)
-    file.close()
-    again.write(b"two\n")
-    again.close()
-    assert path.read_bytes() == b"one\ntwo\n"
-    assert names(path.parent) == ["a.jsonl"]

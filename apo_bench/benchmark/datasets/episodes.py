@@ -14,8 +14,8 @@ from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.simulation.hooks import Doing, Hooks
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_felt
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
-from apo_bench.trial.trial import noise_of, run_trial
 
 _OF_ROW = MappingProxyType(
     {
