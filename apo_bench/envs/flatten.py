@@ -33,8 +33,8 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         seen = spaces.flatten_space(env.observation_space)
         assert isinstance(seen, spaces.Box)
         self.observation_space = self._seen = spaces.Box(seen.low.astype(np.float32), seen.high.astype(np.float32), dtype=np.float32)
-        size = sum(map(_size, _parts(env.action_space).values()))
-        self.action_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+        self._size = sum(map(_size, _parts(env.action_space).values()))
+        self.action_space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Flat, dict[str, Any]]:
         """As in the environment, flat."""
@@ -50,7 +50,7 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         given = np.asarray(action, dtype=np.float32)
         if not self.action_space.contains(given):
             raise InputError(
-                f"the action {shown(action)} was given; {self.action_space.shape[0]} numbers from -1 to 1 are allowed."
+                f"the action {shown(action)} was given; {self._size} numbers from -1 to 1 are allowed."
             )
         seen, reward, terminated, truncated, info = self.env.step(self._action(given))
         return self._flat(seen), float(reward), terminated, truncated, info
