@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from scipy.stats import chi2
 
-from apo_bench.correction.calibration import UNKNOWN, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, prior_estimate, slip_sigmas
 from apo_bench.geometry import Array, pose
 from apo_bench.records import robot_sigmas
 from apo_bench.records.robot_error import Sigmas
@@ -172,7 +172,7 @@ def draw(name: str, sigma_m: float, outlier_m: float, seed: int) -> Draw:
     rng = np.random.default_rng([SEED, seed])
     sigmas = stated(name)
     truth = drawn(sigmas, rng)
-    prior = believe(sigmas, 6, MIDDLE).grasp(0, slip_sigmas(sigmas))
+    prior = prior_estimate(sigmas, 6, MIDDLE).grasp(0, slip_sigmas(sigmas))
     touches = list(touches_of(truth, sigma_m, rng))
     if outlier_m:
         i = int(rng.integers(len(touches)))
@@ -202,7 +202,7 @@ def draw(name: str, sigma_m: float, outlier_m: float, seed: int) -> Draw:
     )
 
 
-def part_at_goal(belief: RobotBelief, truth: Truth) -> tuple[Array, Array]:
+def part_at_goal(belief: RobotEstimate, truth: Truth) -> tuple[Array, Array]:
     """The variances of height, pitch and roll of the part when it is brought to its goal, (3,), and how far they really
     are off, (3,), [m, rad]."""
     near = joints_near(*GOAL[:2, 3].tolist())
