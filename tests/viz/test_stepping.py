@@ -194,8 +194,8 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
         ("view", "stick_in_tower", "--port", "8090"): "--port 8090 was given, which is for a browser, but viser is not",
         ("view", "stick_in_tower", "--port", "70000"): "a whole number from 1 to 65535 is allowed",
         ("view", "stick_in_tower", "--trial", "1"): "--trial, which is for the folder of a sweep",
-        ("replay", "stick_in_tower", "--port", "8090"): "--port 8090, which is for --view, was given without it",
-        ("replay", "stick_in_tower", "--view"): "no window can be opened here (none)",
+        ("run", "stick_in_tower", "--port", "8090"): "--port 8090, which is for --view, was given without it",
+        ("run", "stick_in_tower", "--view"): "no window can be opened here (none)",
     }
     for request, sentence in said.items():
         assert main(request) == 2

@@ -213,7 +213,7 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
     return About(
         name="replays",
         summary="A human assembles parts, a camera sees with an error where each was put, a method plans, a robot arm "
-        "replays, and a judge looks at physics alone. `apo-bench replay` runs the trial of a seed again. Numbers of a "
+        "replays, and a judge looks at physics alone. `apo-bench run` runs the trial of a seed again. Numbers of a "
         f"frame lie between two looks 20 ms apart. Joints and fingers: {', '.join(joints.names)}.",
         command=command,
         fields={
