@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, goals_in_force
+from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, poses_in_force
 from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.records import sentence, touching_sentence
 from apo_bench.simulation.execution.carry_out import bring, take
@@ -114,7 +114,7 @@ def moves_of(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in goals_in_force(plan):
+    for upto, goals in poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)
