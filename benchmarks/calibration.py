@@ -31,7 +31,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.fitted import MeasuredNoise, restated
+from apo_bench.perception.observation.models.fitted import MeasuredNoise, restate
 from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets, read_noise
 from apo_bench.scenario.file import load_scenario
@@ -99,7 +99,7 @@ def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = N
         truth = np.array(layout.poses)
         if seen.observed.all() and not any(outliers(name, seen, truth)):
             made += 1
-            yield measured(restated(seen, *stated) if stated else seen, truth)
+            yield measured(restate(seen, *stated) if stated else seen, truth)
 
 
 def outliers(name: str, seen: Observation, truth: Array) -> Iterator[bool]:
