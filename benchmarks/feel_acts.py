@@ -32,7 +32,7 @@ from apo_bench.benchmark.analysis import wilson
 from apo_bench.errors import InputError
 from apo_bench.records import TrialConfig, parse_method
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.execution.probing.feeling import ACTS
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
@@ -52,7 +52,7 @@ SWEEP = Path(__file__).with_name("robot_errors.toml")
 METHODS = ("contact+probe", "oracle+probe")
 ALL = "all"
 HALF_STEP = "half-step"
-VARIANTS = (ALL, *ACTS, HALF_STEP)
+VARIANTS = (ALL, *PROBING_ACTIONS, HALF_STEP)
 """All acts, all but the one that is named, and all with half the time step."""
 Line = dict[str, Any]
 
@@ -149,7 +149,7 @@ def settings_of(case: Case) -> TrialConfig:
 
 
 def acts_of(variant: str) -> tuple[str, ...]:
-    return tuple(act for act in ACTS if act != variant)
+    return tuple(act for act in PROBING_ACTIONS if act != variant)
 
 
 def trial(case: Case) -> Line:

@@ -14,7 +14,8 @@ from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.resting import resting_poses
 from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
-from apo_bench.simulation.execution.probing.feeling import ACTS, TOUCH_SIGMA_M
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
+from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 
@@ -65,7 +66,7 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
         slip_deg: Standard deviation of how a part turns in the hand.
     """
     left = np.array(error.in_hand)
-    for move in moves(plan, scene, True, ACTS):
+    for move in moves(plan, scene, True, PROBING_ACTIONS):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
         if t.flush is not None:

@@ -10,7 +10,7 @@ from apo_bench.assembly import Observation, Poses, placements
 from apo_bench.geometry import Array
 from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.film.track import Chapter, FilmTrack, scenario_chapter
+from apo_bench.simulation.film.track import Chapter, FilmTrack, scenario_segment
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
@@ -35,7 +35,7 @@ class Rollout:
 def scenario_story(scene: Scene) -> Rollout:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
-    chapter = scenario_chapter(scene, layout.start, layout.poses)
+    chapter = scenario_segment(scene, layout.start, layout.poses)
     return Rollout(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
 
 

@@ -32,7 +32,7 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution import ReplayCache, replay
-from apo_bench.simulation.execution.probing.feeling import ProbingConfig
+from apo_bench.simulation.execution.probing.config import ProbingConfig
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene, build_scene

@@ -32,7 +32,7 @@ from apo_bench.records import (
 from apo_bench.records.run.validation import unwritable
 from apo_bench.scenario import scenario_names
 from apo_bench.simulation.execution import ReplayCache
-from apo_bench.simulation.execution.probing.feeling import ACTS, ProbingConfig
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
@@ -72,7 +72,7 @@ def probing_config(
     stated: str | None,
     seed: tuple[int, ...],
     ft_sensor: str = USUAL_FT_SENSOR,
-    acts: tuple[str, ...] = ACTS,
+    acts: tuple[str, ...] = PROBING_ACTIONS,
 ) -> ProbingConfig:
     """A robot that is told how wrong it may be, and finds out how wrong it is.
 

@@ -16,7 +16,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.records import FtNoise, ft_noise
 from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search
 from apo_bench.simulation.execution.probing import touching
-from apo_bench.simulation.execution.probing.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import (
     OPENING_M,
     TouchPlace,
@@ -24,6 +24,7 @@ from apo_bench.simulation.execution.probing.places import (
     opposite_places,
     wall_places,
 )
+from apo_bench.simulation.execution.probing.state import FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
 from apo_bench.simulation.robot import felt_noise, low_pass_part
 from apo_bench.simulation.scene import Scene
 from apo_bench.viz.robot_form import pose_form, tip_form
@@ -75,7 +76,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, ACTS)],
+        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, PROBING_ACTIONS)],
     }
 
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from apo_bench.simulation.execution.probing.feeling import ACTS
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from benchmarks import feel_acts
 from benchmarks.feel_acts import ALL, HALF_STEP, VARIANTS, Case, acts_of, lines_of, missing, settings_of, table
 from benchmarks.robot_errors import page
@@ -18,8 +18,8 @@ def line(variant, seed, success, scenario=HERE[0]):
 
 
 def test_every_act_is_left_out_once():
-    assert acts_of(ALL) == acts_of(HALF_STEP) == ACTS
-    assert [set(ACTS) - set(acts_of(act)) for act in ACTS] == [{act} for act in ACTS]
+    assert acts_of(ALL) == acts_of(HALF_STEP) == PROBING_ACTIONS
+    assert [set(PROBING_ACTIONS) - set(acts_of(act)) for act in PROBING_ACTIONS] == [{act} for act in PROBING_ACTIONS]
 
 
 def test_half_the_step_changes_nothing_else():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from apo_bench import Plan, Scene, build_scene, draw_layout, replay
+from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, LowPass
 from apo_bench.simulation.robot.paths import shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import WRIST_S, ForceSensors, LowPass
 
 
 @pytest.mark.parametrize("step_s", [0.001, 0.0005, 0.0001])

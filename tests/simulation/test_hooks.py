@@ -9,7 +9,7 @@ import pytest
 from apo_bench import Layout, Plan, Scene, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
+from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
 
 
 class Calls:
@@ -33,9 +33,9 @@ class Calls:
         """What was called; ticks of one operation count once."""
         return [call for call, _ in groupby(self.made)]
 
-    def _tick(self, data: Any, doing: Doing) -> None:
-        self.made.append(("tick", doing.operation))
-        self.macros.add(doing.macro)
+    def _tick(self, data: Any, phase: Phase) -> None:
+        self.made.append(("tick", phase.operation))
+        self.macros.add(phase.macro)
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +94,9 @@ def test_a_function_of_the_state_is_a_hook_too() -> None:
     def look(data: Any) -> None:
         seen.append(data)
 
-    hooks = hooks_of(look)
+    hooks = as_hooks(look)
     assert hooks.after_tick is not None
-    hooks.after_tick("state", Doing(0, "pick", 1.0))
+    hooks.after_tick("state", Phase(0, "pick", 1.0))
     assert seen == ["state"]
-    assert hooks_of(hooks) is hooks
-    assert hooks_of(None).after_tick is None
+    assert as_hooks(hooks) is hooks
+    assert as_hooks(None).after_tick is None

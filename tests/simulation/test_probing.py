@@ -11,9 +11,9 @@ from apo_bench.geometry import pose
 from apo_bench.records import ft_noise
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.probing.feeling import ProbingState, touch_guard
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
-from apo_bench.simulation.execution.probing.touching import _stand_off, find_out
+from apo_bench.simulation.execution.probing.state import ProbingState, touch_guard
+from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
@@ -43,13 +43,13 @@ def drawn(name, kinds, seed=3):
 def found_out(name, error, parts_at=None, stated=STATED):
     """What a robot believes once it has touched what is fixed."""
     start = plan(name).start if parts_at is None else parts_at
-    robot = Robot(scene(name), start, None, "contact", error)
-    feeling = ProbingState(
+    robot = Robot(scene(name), start, None, "near-contact", error)
+    probing = ProbingState(
         probing_config(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error
     )
     robot.wait(0.05)
-    find_out(robot, feeling)
-    return feeling.belief
+    probe_fixed_parts(robot, probing)
+    return probing.estimate
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "peg_in_hole", "pocket_table"])
@@ -67,7 +67,7 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
 
 def test_a_robot_that_may_be_far_off_begins_farther_away():
     def begins(stated):
-        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "contact")
+        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "near-contact")
         probing = probing_config(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
         stand_off = partial(_stand_off, robot, ProbingState(probing, plan("peg_in_hole"), scene("peg_in_hole"), None))
         found = (places(plan("peg_in_hole"), scene("peg_in_hole"), stand_off) for places in (floor_places, wall_places))
@@ -82,9 +82,9 @@ def test_a_robot_that_may_be_far_off_begins_farther_away():
 
 def test_a_robot_that_is_as_far_off_as_it_was_told_feels_the_floor():
     error = drawn("stick_in_tower", "tool:5")
-    belief = found_out("stick_in_tower", error, stated="tool:5")
-    assert len(belief.touches) == 3
-    assert belief.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
+    estimate = found_out("stick_in_tower", error, stated="tool:5")
+    assert len(estimate.touches) == 3
+    assert estimate.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
 
 
 def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
@@ -136,22 +136,22 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
 def test_a_robot_that_does_not_feel_does_nothing_besides():
     for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True):
         assert not move.transfer.squaring
-        assert move.transfer.flush is None
-        assert not move.transfer.beside
+        assert move.transfer.flat is None
+        assert not move.transfer.side_touches
         assert not move.transfer.in_last
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():
     """Walls on all sides: what is left of hand, eye and tool at the goals is a tenth of what was drawn."""
     error = drawn("peg_in_hole", STATED)
-    belief = found_out("peg_in_hole", error)
-    assert not belief.refused
+    estimate = found_out("peg_in_hole", error)
+    assert not estimate.refused
     tip = pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
-    tip[:3, 3] = belief.middle
+    tip[:3, 3] = estimate.middle
     real = error.hand_eye @ tip @ error.tool
-    off = pose.log(pose.inverse(real) @ belief.real(tip))[:3]
+    off = pose.log(pose.inverse(real) @ estimate.real(tip))[:3]
     assert np.linalg.norm(off) < 0.1 * np.linalg.norm((real - tip)[:3, 3])
-    deviations = np.sqrt(np.diag(belief.covariance_of(tip)))[:3]
+    deviations = np.sqrt(np.diag(estimate.covariance_of(tip)))[:3]
     assert (np.abs(off) < 4.0 * deviations).all()
 
 

@@ -12,10 +12,11 @@ from apo_bench.geometry import pose
 from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.execution.search import PITCH_M, RADIUS_M, Spiral, press_in
+from apo_bench.simulation.execution.search import PITCH_M, RADIUS_M, press_in
+from apo_bench.simulation.execution.search_laws import Spiral
 from apo_bench.simulation.execution.transfer import Grip
+from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import shifted, steady
-from apo_bench.simulation.robot.wrist import Guard
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
@@ -45,7 +46,7 @@ def aside(name, mm):
 
 
 def carried_out(plan, name, spiral, cache=None):
-    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", cache, spiral)
+    return replay_and_judge(plan, scene(name), layout(name).goals, None, "near-contact", cache, spiral)
 
 
 def driven(law, push):

@@ -62,7 +62,7 @@ def frames(
                 views.append((stack.enter_context(renderer(chapter.world.model, *size)), camera))
             data = initial_state(chapter.world, chapter.start)
             for moment, force_n, most_n in sampled(chapter.moments, speed / fps):
-                empty = moment.doing.macro in (BY_HAND, TOUCHING)
+                empty = moment.phase.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"
                 caption = Caption(chapter.title, pace, _lines(assembly, moment), force)
                 yield _draw(chapter, data, moment, views, caption), 1.0 / fps
@@ -93,12 +93,12 @@ def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[Fil
     at = -np.inf
     force = 0.0
     most = 0.0
-    operation = moments[0].doing.operation
+    operation = moments[0].phase.operation
     for moment in moments:
-        if moment.doing.operation != operation:
-            operation = moment.doing.operation
+        if moment.phase.operation != operation:
+            operation = moment.phase.operation
             most = 0.0
-        force = max(force, moment.doing.force_n)
+        force = max(force, moment.phase.force_n)
         most = max(most, force)
         if moment.time_s >= at or moment is moments[-1]:
             yield moment, force, most
@@ -108,19 +108,19 @@ def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[Fil
 
 def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
-    k = moment.doing.operation
+    k = moment.phase.operation
     if k is None:
-        return "the closed hand touches what is fixed" if moment.doing.macro == TOUCHING else "at the start"
+        return "the closed hand touches what is fixed" if moment.phase.macro == TOUCHING else "at the start"
     operation = assembly.operations[k]
     carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
-    undone = " undone" * moment.doing.undoes
-    return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.doing.macro}"
+    undone = " undone" * moment.phase.undoes
+    return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.phase.macro}"
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
     """What is done, and the contacts that it makes."""
     words = operation_words(assembly, moment)
-    if moment.doing.operation is None:
+    if moment.phase.operation is None:
         return (words,)
-    contacts = "; ".join(map(str, assembly.operations[moment.doing.operation].contacts))
+    contacts = "; ".join(map(str, assembly.operations[moment.phase.operation].contacts))
     return (words, textwrap.shorten(contacts, _LETTERS, placeholder=" .."))

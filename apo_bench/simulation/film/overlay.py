@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly import PartFace, Poses
 from apo_bench.geometry import Array, Face, pose
 from apo_bench.simulation.film.track import Chapter, FilmMoment, part_poses
-from apo_bench.simulation.scene import Scene, place
+from apo_bench.simulation.scene import Scene, set_part_pose
 
 Color = tuple[float, float, float]
 HAND_M = 0.012
@@ -63,7 +63,7 @@ def _draw_parts(scene: Scene, overlay: Overlay, drawn: Any) -> None:
     data = mujoco.MjData(world.model)
     for part, T in overlay.poses.items():
         if part in world.qpos:
-            place(world, data, part, T)
+            set_part_pose(world, data, part, T)
     mujoco.mj_kinematics(world.model, data)
     begin = drawn.ngeom
     dynamic = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)

@@ -1,8 +1,9 @@
 """The arm in motion: lines followed, contacts felt."""
 
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
+from apo_bench.simulation.robot.forces import Guard, LowPass
 from apo_bench.simulation.robot.gripper import ArmAlone, HasGripper, gripper_boxes
-from apo_bench.simulation.robot.in_hand import TINY_S, HoldWatch, take_along, weld
+from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
 from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, obstacle
 from apo_bench.simulation.robot.paths import (
     Trajectory,
@@ -14,19 +15,11 @@ from apo_bench.simulation.robot.paths import (
     turn_from,
     with_height,
 )
-from apo_bench.simulation.robot.reach import at_end, led_there, way_there
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot.reach import at_end, follow_waypoints, plan_waypoints
+from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import (
-    BANDWIDTH_HZ,
-    READING_S,
-    Guard,
-    LowPass,
-    WristSensor,
-    felt_noise,
-    low_pass_part,
-    part_loads,
-)
+from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, READING_S, WristSensor, felt_noise, low_pass_part, part_loads
 
 __all__ = (
     "BANDWIDTH_HZ",
@@ -34,9 +27,9 @@ __all__ = (
     "TINY_S",
     "ArmAlone",
     "Guard",
-    "Halt",
+    "ExecutionAborted",
     "HasGripper",
-    "HoldWatch",
+    "GraspSlipMonitor",
     "LowPass",
     "Moving",
     "Obstacle",
@@ -48,7 +41,7 @@ __all__ = (
     "comply",
     "felt_noise",
     "gripper_boxes",
-    "led_there",
+    "follow_waypoints",
     "low_pass_part",
     "minimum_jerk",
     "near_spans",
@@ -63,7 +56,7 @@ __all__ = (
     "steady",
     "take_along",
     "turn_from",
-    "way_there",
+    "plan_waypoints",
     "weld",
     "with_height",
     "wrist_of",
