@@ -18,7 +18,7 @@ from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.perception.detection.contacts import recognise as recognise
+from apo_bench.perception.detection.contacts import detect_contacts as detect_contacts
 from apo_bench.perception.observation.observing import observe as observe
 from apo_bench.records.settings import TrialConfig as TrialConfig
 from apo_bench.records.thresholds import Criteria as Criteria

@@ -61,7 +61,7 @@ for each in metadata.distributions():
 print(json.dumps(found))
 """
 TIME = "import time; began = time.process_time(); import apo_bench; print(time.process_time() - began)"
-TRIAL = ("replay", "stick_in_tower", "--seed", "7", "--fidelity", "near-contact", "--json")
+TRIAL = ("run", "stick_in_tower", "--seed", "7", "--fidelity", "near-contact", "--json")
 CORRECT = ("correct", "stick_in_tower", "--observation", "seen.csv", "--method", "contact")
 SWEEP = (
     *(

@@ -32,6 +32,7 @@ from apo_bench.benchmark.analysis import wilson
 from apo_bench.errors import InputError
 from apo_bench.records import TrialConfig, parse_method
 from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
@@ -172,7 +173,8 @@ def trial(case: Case) -> Line:
     error = draw_robot_error(settings.robot_error, scene, case.seed)
     key = stream_key(case.seed, WRENCH)
     probing = probing_config(planned.plan, scene, settings.robot_error, key, settings.ft_sensor, acts_of(case.variant))
-    attempt = replay_and_judge(planned.plan, scene, truth, fidelity=settings.fidelity, error=error, probing=probing)
+    config = ExecutionConfig(settings.fidelity, robot_error=error, probing=probing)
+    attempt = replay_and_judge(planned.plan, scene, truth, config=config)
     outcome = trial_outcome(attempt)
     felt = attempt.result.felt
     return first | {

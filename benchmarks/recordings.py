@@ -27,6 +27,7 @@ from apo_bench.importers.recording.importing import ImportedRecording, import_re
 from apo_bench.importers.recording.objects_file import name_tracks, read_objects
 from apo_bench.importers.recording.ordering import Stated
 from apo_bench.judging.verdict import judge
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial.planning import apply_method
 from benchmarks.made_with import said_by, with_mujoco
@@ -94,7 +95,7 @@ def carried_out(truth: Truth, found: ImportedRecording, method: str) -> tuple[bo
     made = apply_method(method, found.observation, None, where=truth.scene)
     if made.plan is None:
         return False, made.failure.code if made.failure else "no plan"
-    done = replay(made.plan, truth.scene, parts_at=truth.layout.start, fidelity="near-contact")
+    done = replay(made.plan, truth.scene, config=ExecutionConfig("near-contact"), parts_at=truth.layout.start)
     verdict = judge(truth.scene.scenario.assembly, done.reached, truth.layout.poses, truth.scene.criteria)
     return verdict.success, done.outcome.code if done.outcome.failed else verdict.rests_on.code
 

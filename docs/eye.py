@@ -1,4 +1,4 @@
-"""Draw what the range finder saw, stage by stage, as in `apo-bench eye`: `python docs/eye.py` (seconds)."""
+"""Draw what the range finder saw, stage by stage, as in `apo-bench inspect depth`: `python docs/eye.py` (seconds)."""
 
 from __future__ import annotations
 

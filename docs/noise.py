@@ -30,7 +30,7 @@ to the same laws: over seeds, errors have zero mean and the covariance that is d
 of the world frame; what was not seen says so; what was seen reaches the robot bit for bit.
 
 Tables show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part:
-their standard deviation, the one that observations state, and percentiles of their size. `apo-bench noise card NAME`
+their standard deviation, the one that observations state, and percentiles of their size. `apo-bench noise show NAME`
 prints a card, with `--noise-level` at another level.
 """
 

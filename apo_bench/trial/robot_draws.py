@@ -69,12 +69,12 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
     for move in moves(plan, scene, True, PROBING_ACTIONS):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
-        if t.flush is not None:
-            felt = np.array([place.point for place in t.beside]) if t.beside else t.flush.feet
+        if t.flat is not None:
+            felt = np.array([place.point for place in t.side_touches]) if t.side_touches else t.flat.feet
             lever = float(np.linalg.norm(felt - felt.mean(axis=0), axis=1).max())
             told = TOUCH_SIGMA_M / lever
             slip[2:4] *= 0.0, told / np.hypot(told, np.radians(slip_deg))
-        if t.beside or t.front is not None:
+        if t.side_touches or t.front is not None:
             slip[1] = 0.0
         left[move.step.operation] = pose.exp(slip)
     none = np.eye(4)

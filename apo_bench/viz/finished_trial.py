@@ -28,7 +28,7 @@ def trial_again(folder: Path, number: int | None, secret_seed_file: Path | None 
     if named := own_code(row):
         raise RuntimeError(
             f"trial {number} names code that does not come with the package ({', '.join(named)}), which no file makes "
-            "run; give it to `apo-bench replay .. --view` yourself."
+            "run; give it to `apo-bench run .. --view` yourself."
         )
     name = row["scenario"]
     spec = settings_of(row, scenario_files(read_run(folder)).get(name, name))

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 
 from apo_bench.assembly import Outcome
 from apo_bench.envs.apo_insert import APOInsert
-from apo_bench.envs.starts import Trials
+from apo_bench.envs.episode_start import Trials
 from apo_bench.errors import InputError
 from apo_bench.records import FIRST_TRAINING_TRIAL
 

@@ -28,9 +28,8 @@ def test_an_episode_promises_what_its_trial_promises() -> None:
 
 
 def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from apo_bench.envs import starts
 
-    monkeypatch.setattr(starts, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
+    monkeypatch.setattr(robot, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     env = Corrected(APOReplay(SCENARIO, min_predicted_success=1.0))
     env.reset(seed=SEED)
     _, reward, terminated, _, info = env.step(zeros(env))

@@ -16,7 +16,7 @@ from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.formats.bop import read_results
 from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
-from apo_bench.io.ordinary_files import read_bytes, read_text
+from apo_bench.io.safe_io import read_bytes, read_text
 from apo_bench.perception.observation.noise_file import read_noise
 from apo_bench.scenario.parts import load_part
 
@@ -168,7 +168,16 @@ def test_text_of_another_syntax_is_refused(text: str, syntax: Any, words: str) -
 @pytest.mark.skipif(sys.platform != "linux", reason="the devices have these names on Linux")
 def test_the_command_line_does_not_wait_for_its_input() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "apo_bench.cli.app", "graph", "stick_in_tower", "--observation", "/dev/stdin"],
+        [
+            sys.executable,
+            "-m",
+            "apo_bench.cli.app",
+            "inspect",
+            "graph",
+            "stick_in_tower",
+            "--observation",
+            "/dev/stdin",
+        ],
         stdin=subprocess.PIPE,
         capture_output=True,
         text=True,

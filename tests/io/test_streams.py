@@ -64,7 +64,7 @@ def test_letters_that_the_terminal_does_not_have(tmp_path: Path) -> None:
 
 
 def test_what_is_too_long_to_be_read_is_said_without_its_middle(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scenarios", "x" * 100_000 + ".toml"]) == 2
+    assert main(["scenario", "show", "x" * 100_000 + ".toml"]) == 2
     said = capsys.readouterr().err
     assert len(said) < 2000
     assert said.startswith("apo-bench: xxx")

@@ -9,6 +9,7 @@ import pytest
 
 from apo_bench import InputError, Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
@@ -62,9 +63,9 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     cache = ReplayCache()
     plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.poses)
-    first = replay(plan, scene(), fidelity="near-contact", cache=cache)
+    first = replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), fidelity="near-contact", cache=cache) is first
+    assert replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():
@@ -132,7 +133,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
 def test_contact_simulates_less_and_passes_as_much_time():
     layout = shown().layout
     plan = Plan(scene().scenario.assembly, layout.start, layout.poses)
-    full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "near-contact"))
+    full, contact = (replay(plan, scene(), config=ExecutionConfig(fidelity)) for fidelity in ("full", "near-contact"))
     assert full.outcome.code == contact.outcome.code == "ok"
     assert contact.sim_time_s == pytest.approx(full.sim_time_s, abs=0.5)
     for part, T in full.reached.final.poses.items():

@@ -3,9 +3,10 @@
 import numpy as np
 
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.film.caption import ABOVE_PX, BELOW_PX, Caption, add_caption
 from apo_bench.simulation.film.film import frames, operation_words, sampled
-from apo_bench.simulation.film.track import Chapter, FilmMoment, FilmTrack
+from apo_bench.simulation.film.track import FilmMoment, FilmTrack, Segment
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Phase
 
 
@@ -28,7 +29,7 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     track = FilmTrack()
     hands = FilmTrack()
     plan = Plan(assembly, layout.start, layout.poses)
-    assert replay(plan, scene, track.hooks, fidelity="near-contact").outcome.code == "ok"
+    assert replay(plan, scene, track.hooks, config=ExecutionConfig("near-contact")).outcome.code == "ok"
     assert track.plan is plan
     order = list(dict.fromkeys((m.phase.operation, m.phase.macro) for m in track.moments if m.phase.operation == 1))
     assert order == [(1, stage) for stage in ("pick", "lift", "carry", "move-to-contact", "release", "depart")]
@@ -43,8 +44,8 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands.hooks)
     assert {m.phase for m in hands.moments} == {Phase(k, BY_HAND, 0.0) for k in (None, 0, 1)}
     end = np.array(hands.moments[-1].qpos)
-    chapter = Chapter("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)
-    drawn = [picture for picture, _ in frames(assembly, layout.start, [chapter])]
+    segment = Segment("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)
+    drawn = [picture for picture, _ in frames(assembly, layout.start, [segment])]
     assert drawn[0].shape == drawn[-1].shape
     assert np.abs(drawn[0].astype(int) - drawn[1]).max() > 50
     assert np.array_equal(end, hands.moments[-1].qpos)

@@ -9,6 +9,7 @@ import pytest
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import ft_noise
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
@@ -55,7 +56,7 @@ def found_out(name, error, parts_at=None, stated=STATED):
 @pytest.mark.parametrize("name", ["stick_in_tower", "peg_in_hole", "pocket_table"])
 def test_the_floor_is_touched_at_three_places_around_the_goals(name):
     places = floor_places(plan(name), scene(name))
-    middle = plan(name).goals[:, :2, 3].mean(axis=0)
+    middle = plan(name).target_poses[:, :2, 3].mean(axis=0)
     angles = [np.arctan2(*(place.T_world_tip[:2, 3] - middle)[::-1]) for place in places]
     assert len(places) == 3
     # every third of a turn, so the middle is inside
@@ -91,7 +92,9 @@ def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_a
     name = "stick_in_tower"
     error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
     probing = probing_config(plan(name), scene(name), "tool:1.2", (5,), "ideal")
-    outcome = replay(plan(name), scene(name), fidelity="near-contact", error=error, probing=probing).outcome
+    outcome = replay(
+        plan(name), scene(name), config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+    ).outcome
     assert (outcome.stage, outcome.code, outcome.operation) == ("touch", "collision", None)
     assert outcome.sentence == (
         "the arm struck table while it touched what is fixed, before the first operation: it began 4.0 mm before what "
@@ -127,7 +130,7 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
     probing = probing_config(plan(name), scene(name), "in_hand:0.5/1", (6,))
     felt = replay_and_judge(
-        plan(name), scene(name), plan(name).goals, fidelity="near-contact", error=error, probing=probing
+        plan(name), scene(name), plan(name).target_poses, config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
     )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
@@ -172,10 +175,12 @@ def test_the_robot_knows_nothing_but_what_it_touches():
 def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
     name = "stick_in_tower"
     error = drawn(name, "hand_eye:0.5/0.1+in_hand:0.3/1", 4)
-    goals = plan(name).goals
-    blind = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error)
+    goals = plan(name).target_poses
+    blind = replay_and_judge(plan(name), scene(name), goals, config=ExecutionConfig("near-contact", robot_error=error))
     probing = probing_config(plan(name), scene(name), "hand_eye:0.5/0.1+in_hand:0.3/1", (6,))
-    felt = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error, probing=probing)
+    felt = replay_and_judge(
+        plan(name), scene(name), goals, config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+    )
     assert not blind.verdict.success
     assert felt.verdict.success
     assert felt.result.felt.touches == 7

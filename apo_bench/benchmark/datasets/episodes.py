@@ -12,7 +12,7 @@ from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, write_
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
-from apo_bench.simulation.hooks import Phase, Hooks
+from apo_bench.simulation.hooks import Hooks, Phase
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_sensors_on
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import noise_of, run_trial
@@ -213,7 +213,7 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
     return About(
         name="replays",
         summary="A human assembles parts, a camera sees with an error where each was put, a method plans, a robot arm "
-        "replays, and a judge looks at physics alone. `apo-bench replay` runs the trial of a seed again. Numbers of a "
+        "replays, and a judge looks at physics alone. `apo-bench run` runs the trial of a seed again. Numbers of a "
         f"frame lie between two looks 20 ms apart. Joints and fingers: {', '.join(joints.names)}.",
         command=command,
         fields={

@@ -25,7 +25,7 @@ Files = Mapping[str, str]
 
 
 def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
-    """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
+    """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
     return f"{without_seed(row, files, limits)} --seed {row['seed']}"
 
 
@@ -33,7 +33,7 @@ def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Lim
     """A replay command without its seed: what the trials of a cell have in common."""
     scenario = str((files or {}).get(row["scenario"], row["scenario"]))
     scenario = f"./{scenario}" if scenario.startswith("-") else scenario
-    return shlex.join(["apo-bench", "replay", scenario, *_options(row, limits)])
+    return shlex.join(["apo-bench", "run", scenario, *_options(row, limits)])
 
 
 def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:

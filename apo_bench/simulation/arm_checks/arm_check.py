@@ -22,18 +22,15 @@ _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.4
 _TABLE_M = 0.03
 _TURNS = (-1.2, 0.0, 1.2)
 """Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
-
 _PUSH_N = 5.0
 _PUSH_S = 0.5
 """Stiffness is looked at by this push, which lasts so long."""
-
 _LAYOUTS = 20
 _MOST_GIVING_M = 0.002
 _LEAST_MARGIN_DEG = 5.0
 _MOST_TURN_DEG = 5.0
 _LEAST_EVENNESS = 0.3
 """Of two pads on a part that stands fast between them; hands that held parts well had 0.45 at least."""
-
 _LEVER_M = 0.1
 
 

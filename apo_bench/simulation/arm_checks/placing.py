@@ -14,7 +14,6 @@ from apo_bench.simulation.scene import Scene
 
 _BASES_M = tuple(product((0.0, 0.1, 0.2), (-0.45, -0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1)))
 """Height and place behind the middle of the table."""
-
 _NEARER_M = (0.04, 0.08, 0.12)
 _NARROWER = 0.5
 """How much nearer to the arm the site may be, which then is narrower."""

@@ -11,19 +11,14 @@ from apo_bench.simulation.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
-
 _HIGH_M = 0.35
 """Height at which errors are looked at, where the arm reaches it; else at that of its home."""
-
 _AHEAD_M = 0.25
 """Farther ahead of its base than this: a line beside its axis turns it fast."""
-
 WAY_M = 0.15
 """Length of the way along which they are looked at."""
-
 STAND_S = 0.3
 """How long the arm stands before it."""
-
 _RESTS_M = 2e-5
 _LOOKS = 10
 """It stands so much longer, as often as this, until the tip is where it shall be: weak joints swing behind."""

@@ -23,7 +23,6 @@ _MOST_FORCE_N = 60.0
 _MOST_OPENING_MM = 1000.0
 _STATED = ("tip", "slides", "opening_mm")
 """Keys of a gripper that is not measured."""
-
 _USUAL_BASE = frozen(pose.at((-0.45, 0.0, 0.0)))
 """Where a base stands that nothing is said of and that reaches the table: behind its middle, (4, 4), world, [m]."""
 

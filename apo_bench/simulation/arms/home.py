@@ -14,14 +14,12 @@ from apo_bench.simulation.frames import frame
 _AT = (-0.05, 0.0, 0.30)
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
 """Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room; ways it may wait."""
-
 _TURNS = (-1.6, 0.0, 1.6)
 _WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 _MOST_PLACES = len(_TABLE) * len(_TURNS)
 _NEARER_M = (-0.4, -0.3, -0.2, -0.1)
 _STANDS_M = (0.0, 0.1, 0.2)
 """Where the base of an arm may stand that reaches at most half of these: behind the middle of the table, how high."""
-
 _TRIES = 40
 _QUICK_TRIES = 16
 _WIDEST = 3.0

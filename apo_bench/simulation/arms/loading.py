@@ -15,7 +15,6 @@ _LARGEST_BASE_M = 0.5
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
 _OF_THE_SCENE = ("sensors", "keys", "cameras", "lights", "textures", "pairs", "skins", "texts", "numerics", "tuples")
 """A scene has these itself, or needs none of them."""
-
 _NOT_RIGID = ("flexes", "hfields", "plugins")
 """An arm is made of rigid bodies, and runs no code."""
 

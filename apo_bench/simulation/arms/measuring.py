@@ -26,10 +26,8 @@ _LEVELS = 17
 _LEAST_M = 0.004
 _FAR_M = 1.0
 """Commands that are tried between closed and open; grippers that open less do not count; farther is not looked."""
-
 _BEYOND_M = 0.01
 """So far the pads reach beyond the tip."""
-
 _STROKE_S = 0.1
 """So much longer than to open a gripper may take to close."""
 

@@ -10,10 +10,8 @@ from apo_bench.simulation.arms.shapes import below, geom_reach
 
 _MOVES_M = 0.001
 """What moves less is no finger."""
-
 _TIP_M = 0.012
 """What ends within this of the farthest end is of a pad."""
-
 _SNAP = float(np.cos(np.radians(1.0)))
 _SNAP_AHEAD = float(np.cos(np.radians(10.0)))
 """A direction so near to an axis of the flange is meant as that axis."""

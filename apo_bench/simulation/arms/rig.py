@@ -19,10 +19,8 @@ LONGEST_S = 1.5
 _STILL = 2e-3
 _QUIET = 20
 """Longest time of one command; joints slower than the second rest after so many steps."""
-
 _HEAVY = 10.0
 """[kg m^2]"""
-
 _MOST_ACTUATORS = 4
 
 

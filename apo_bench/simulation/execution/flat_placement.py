@@ -19,13 +19,10 @@ from apo_bench.simulation.scene import Scene
 
 NOISE_LEVEL = float(np.cos(np.radians(10.0)))
 """A face that looks up by less than ten degrees off is one to lie on."""
-
 _LOWEST_M = 1e-4
 """Corners this near to the lowest one lie on the floor."""
-
 _LIFT_M = 0.01
 """What stood is lifted so far before it is laid down again."""
-
 _LIFT_ROOM_M = 0.002
 _LIFT_STEP_M = 0.003
 """On the way down everything else stays this far away; it is looked at this often."""

@@ -12,24 +12,18 @@ from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Guard, Robot, Trajectory, servo, shifted, smooth
 
 RADIUS_M = 0.002
-PITCH_M = 0.00035
-"""How far off a hole is looked for; the turns are less far apart than the usual play of 0.5 mm is wide."""
-
+"""The robot searches for a hole so far off."""
 YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
 YAWED_RADIUS_M = 0.001
 """Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
-
 _BACK_M = 0.0005
 _BACK = 0.005
 _BRING = 0.03
 """Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
-
 _DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
-
 SEARCHES = 3
 """A motion is searched for so many times at most, in one transfer up to twice as often."""
-
 _PIECE_M = 0.01
 _NOTHING_M = 1e-6
 """Giving way, the tip goes on in pieces of this length; less than the second is nothing."""

@@ -9,26 +9,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.simulation.execution.search import PITCH_M
 from apo_bench.simulation.robot import Guard, LowPass
 
+PITCH_M = 0.00035
+"""Distance between the turns of a spiral; the usual play of 0.5 mm is wider."""
 _ACROSS = 0.01
 _FEED = 0.005
 _EASE = 0.02
 """Speeds [m/s]: along the spiral, ahead where nothing pushes back, and ahead in a hole."""
-
 _SOFT = 0.02
 """How fast the speed ahead grows, [m/s^2]: what lost touch by a few hundredths of a millimetre comes back softly."""
-
 _YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N]: the arm pushes with some 100 N per mm, and faster it rattles."""
-
 _FELT_S = 0.01
 """Forces are averaged over this time: hard parts rattle."""
-
 _INNER_M = 0.0005
 """Inside this radius the spiral is slower: around its middle it would turn at once."""
-
 _PATIENCE = 3.0
 _DOWN_S = 1.0
 """A spiral ends after so many times the time that its length takes, and this long, [s], for the way ahead."""

@@ -22,20 +22,14 @@ from apo_bench.simulation.scene import Scene
 
 LEAN_RAD = float(np.radians(3.0))
 """More than a part that was laid down is still turned in the hand."""
-
 STAND_OFF_M = 0.004
 """A touch begins so far before it is expected."""
-
 _OVER_M = 0.003
 """The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
-
 _APART_M = 0.01
 """Places that are less far apart tell a tilt no better than feet do."""
-
 _ROOM_M = 0.001
-
 _STEP_M = 0.002
-
 _LOOKS_M = 0.004
 
 

@@ -26,7 +26,7 @@ class FilmMoment(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Chapter:
+class Segment:
     """A demonstration or a replay from its beginning to its end."""
 
     title: str
@@ -60,7 +60,7 @@ class FilmTrack:
         self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), phase, np.array(data.mocap_pos)))
 
 
-def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Chapter:
+def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
     """What a scenario asks for: the parts before the first operation and after each, a second apart."""
     world = scene.work
     data = initial_state(world, start)
@@ -71,22 +71,22 @@ def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Chapter:
             set_part_pose(world, data, part, poses[part])
         phase = Phase(None if k < 0 else k, _IN_PLACE, 0.0)
         moments.append(FilmMoment(k + 1.0, np.array(data.qpos), phase, _NO_HANDS))
-    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
+    return Segment(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
 
 
-def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
+def part_poses(segment: Segment, moment: FilmMoment) -> Poses:
     """Where every part is, world frame, [m]."""
-    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in chapter.world.qpos.items()}
-    return {**{part: chapter.start[part] for part in chapter.world.fixed}, **free}
+    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in segment.world.qpos.items()}
+    return {**{part: segment.start[part] for part in segment.world.fixed}, **free}
 
 
-def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -> None:
+def show_moment(scene: Scene, data: Any, segment: Segment, moment: FilmMoment) -> None:
     """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
-    if chapter.world is scene.work:
+    if segment.world is scene.work:
         data.qpos[:] = moment.qpos
     else:
         arm_home(scene, data)
-        for part, T in part_poses(chapter, moment).items():
+        for part, T in part_poses(segment, moment).items():
             if part in scene.work.qpos:
                 set_part_pose(scene.work, data, part, T)
     place_for_picture(scene.work.model, data)

@@ -10,25 +10,18 @@ from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
-
 _STROKE = 0.15
 """Peak speed of a hand that brings a part to its place, [m/s]."""
-
 _SHIFT = 0.03
 """Peak speed of a small adjustment, and of coming to lie against another part, [m/s]."""
-
 _NUDGE = 0.01
 """Peak speed of lifting and lowering a part for an adjustment, [m/s]."""
-
 _SAFE_M = 0.16
 """Least height at which parts are carried over the others."""
-
 _DROP_M = 0.0002
 """A part is let go this much above its support, as nobody presses it into the table."""
-
 _LIFT_M = 0.0003
 """How far a part is lifted while it is adjusted, so that it does not drag the one below."""
-
 STAND_STILL_S = 0.3
 _SETTLE_S = 0.15
 """A group trails behind a quick hand by a millimetre; so long it takes to catch up."""

@@ -13,7 +13,6 @@ WRIST_S = 0.02
 """Time constant of the sensor at the wrist (8 Hz). Where hard parts touch, the force of a single step nearly doubles
 when the step is halved, while its impulse stays; behind the filter it hardly depends on the step. Real sensors of force
 are read behind filters of 5 to 70 Hz for the same reason."""
-
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
 

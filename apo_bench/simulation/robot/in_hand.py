@@ -20,7 +20,6 @@ from apo_bench.simulation.scene import Scene, World, part_pose, set_part_pose, t
 
 SLIPS_M = 5e-5
 """What moves farther in the hand in a tick does not creep: it slips."""
-
 TINY_S = 1e-4
 """Speeds of the tip are differences over this time."""
 

@@ -25,15 +25,11 @@ from apo_bench.simulation.scene import WRIST_SENSORS, Scene
 
 READING_S = 0.001
 """Time from one reading to the next. Each is the mean since the one before, with new noise, whatever the step."""
-
 BANDWIDTH_HZ = 16.0
 """Of the low pass, a time constant of 10 ms: so much the robot feels late, and a reading's noise is 0.22 times."""
-
 OFFSETS = 20.0
 """Standard deviation of what a sensor shows of nothing until it is zeroed, in standard deviations of its noise."""
-
 _GRAVITY = 9.81
-
 _ROUNDING_S = 1e-9
 
 

@@ -38,7 +38,6 @@ _NEAREST_M = 1e-10
 by less are at times found to be millimetres inside of each other, and leap apart."""
 _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
 """Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
-
 _WRIST_SITE = "wrist"
 _BEHIND_PICTURE = 3
 """Of MuJoCo's groups of geoms, 0 to 2 are shown."""

@@ -15,16 +15,12 @@ from apo_bench.simulation.scene.walls import linings, simulated_pieces
 
 _ARM = 1
 """The bit by which an arm meets everything."""
-
 OF_PARTS = (1 << 31) - 1 - _ARM
 """All other bits: what parts meet by."""
-
 _PARTS = 1 << 30
 """The bit by which parts meet each other; those below it are of holes, the narrowest has the highest."""
-
 _MOST = 16
 """So many widths of holes are told apart; wider ones count as one."""
-
 _SURELY_M = 1e-4
 """What is wider than the hole without its walls by this stays out."""
 

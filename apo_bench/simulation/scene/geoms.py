@@ -15,17 +15,13 @@ from apo_bench.simulation.scene.contact_bits import Bits, is_lining
 
 _ROLLING_CONDIM = 6
 """Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""
-
 _GRIPPY = 0.8
 """A part of less sliding friction is smooth; the pads' friction is meant on one of so much."""
-
 SMOOTH_PRIORITY = 2
 """Of a smooth part, over that of pads, 1: its own friction counts wherever it touches anything. Otherwise it would be
 the pads', or the larger of the two."""
-
 _PADS_CONDIM = 4
 """Of contacts with pads: torsional friction, too."""
-
 _SURFACE = ("friction", "density", "rgba", "condim")
 """What a geom has besides its shape."""
 

@@ -14,7 +14,6 @@ from apo_bench.simulation.scene.world import World
 _GRAVITY = 9.81
 _SAFE = 2.0
 """Friction must hold so many times the weight: carried, a part also pulls by its inertia and its lever."""
-
 _BESIDE_M = 0.002
 """Room beside the part for each finger."""
 

@@ -55,15 +55,14 @@ class Start:
 
 
 def prepare_start(
-    plan: Plan, scene: Scene, k: int, config: ExecutionConfig, sensor: str, noise_seed: tuple[int, ...]
+    plan: Plan, scene: Scene, k: int, config: ExecutionConfig, sensor: tuple[str, tuple[int, ...]]
 ) -> Start | Outcome:
     """Execute a plan up to where the guarded motion of an operation begins; or return what failed before.
 
     Args:
         k: The operation, counted from 0; the last time that it is done.
         config: How the robot executes it; it skips free motions and searches for holes anyway.
-        sensor: The force-torque sensor at the wrist, by name.
-        noise_seed: The seed of its noise.
+        sensor: The force-torque sensor at the wrist, by name, and the seed of its noise.
     """
     at = max(i for i, step in enumerate(plan.schedule) if step.operation == k and not step.undo)
     config = replace(config, fidelity="near-contact", spiral=True)
@@ -73,7 +72,7 @@ def prepare_start(
         outcome = execution.run(execution.moves()[:at], ReplayCache(), [b"%d" % i for i in range(2 * at)])
         if outcome.failed:
             return outcome
-        return _hold(execution, execution.moves()[at], sensor, noise_seed)
+        return _hold(execution, execution.moves()[at], sensor)
 
 
 def prepare_next_start(
@@ -82,8 +81,7 @@ def prepare_next_start(
     start: Start,
     reached: Snapshot,
     error: RobotError | None,
-    sensor: str,
-    noise_seed: tuple[int, ...],
+    sensor: tuple[str, tuple[int, ...]],
 ) -> Start | Outcome:
     """The start of the next operation, by the robot that has just released a part; as `prepare_start`, without probing.
 
@@ -96,10 +94,10 @@ def prepare_next_start(
     execution.progress.after[:] = [*start.after, reached]
     with allow_sleep(robot.scene.work, robot.scene.grasp == "friction"):
         restore_state(save_state(robot, 0, execution.progress), execution.robot)
-        return _hold(execution, execution.moves()[start.operation + 1], sensor, noise_seed)
+        return _hold(execution, execution.moves()[start.operation + 1], sensor)
 
 
-def _hold(execution: Execution, move: Move, sensor: str, noise_seed: tuple[int, ...]) -> Start | Outcome:
+def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]]) -> Start | Outcome:
     """Pick the part of a move and hold it before its hole."""
     robot = execution.robot
     robot.step, t = move
@@ -110,7 +108,7 @@ def _hold(execution: Execution, move: Move, sensor: str, noise_seed: tuple[int, 
         with robot.watch_stability():
             i = execution.pick(t, k)
             grip, second = before_attach(robot, t, i, execution.laying(t, k))
-            wrist = wrist_of(robot, sensor, np.random.default_rng(noise_seed))
+            wrist = wrist_of(robot, sensor[0], np.random.default_rng(sensor[1]))
             wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
             zero(robot, wrist)
     except ExecutionAborted as aborted:

@@ -99,7 +99,7 @@ def dangerous(seed: int, evil: str) -> dict[str, Any]:
 @pytest.mark.parametrize("evil", DANGEROUS)
 def test_commands_are_quoted(evil: str) -> None:
     said = shlex.split(replay_command(dangerous(3, evil)))
-    assert said[:2] == ["apo-bench", "replay"]
+    assert said[:2] == ["apo-bench", "run"]
     assert said[2] == (f"./{evil}" if evil.startswith("-") else evil)
     for option, value in (("--noise", evil), ("--arm", evil), ("--contact-source", f"x:{evil}"), ("--method", evil)):
         assert said[said.index(option) + 1] == value

@@ -118,7 +118,7 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         first = lines.nth(3).inner_text()
         assert first.startswith("3")
         assert "2.03" in first
-        want = "apo-bench replay stick_in_tower --noise-level 2 --clearance-mm 0.25 --method paper --seed 3"
+        want = "apo-bench run stick_in_tower --noise-level 2 --clearance-mm 0.25 --method paper --seed 3"
         assert lines.nth(3).locator("code").inner_text() == want
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         lines.nth(3).locator("button.copy").click()

@@ -140,7 +140,7 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     film = tmp_path / "film.gif"
     seen = tmp_path / "seen.json"
     trial = [
-        "replay",
+        "run",
         "block_on_block",
         "--human-error-scale",
         "0",
@@ -154,19 +154,19 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     assert main([*trial, "--method", "uncorrected", *written, "--noise-level", "0.1"]) == 0
     capsys.readouterr()
     assert len(imageio.imread(film, index=None)) > 10
-    measured = ["replay", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
+    measured = ["run", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
     late = json.loads(capsys.readouterr().out)
     assert (late["failure_code"], late["noise"], late["noise_level"]) == ("time_limit", "measured", None)
 
 
 def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", "block_on_block", "--method", "unruly:hangs", "--trial-limit", "-1"]) == 2
+    assert main(["run", "block_on_block", "--method", "unruly:hangs", "--trial-limit", "-1"]) == 2
     assert "a limit of -1 s per trial was given" in capsys.readouterr().err
 
 
 TALKS = [
-    "replay",
+    "run",
     "block_on_block",
     "--human-error-scale",
     "0",

@@ -25,11 +25,11 @@ from apo_bench.correction.robust.noise_scale import likeliest_scale
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import views_of
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.failures import make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.correction.robust.test_looks import Again, at_the_same_place
@@ -173,7 +173,9 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     noise = make_failures("flips", NoiseLevel(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
-    looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
+    looks = Reobservations(
+        first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1])
+    )
     assert correct(seen, look=looks).ok
     assert counts
     assert max(counts) < 300

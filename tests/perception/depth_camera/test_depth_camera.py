@@ -218,7 +218,7 @@ def test_a_trial_through_the_range_finder() -> None:
 
 def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "eye.png"
-    assert main(["pose_source", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
+    assert main(["inspect", "depth", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
     form = json.loads(capsys.readouterr().out)
     assert form["schema"] == "apo-bench/eye/1"
     assert [operation["found"] for operation in form["operations"]] == [True, True]
@@ -322,7 +322,7 @@ def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     monkeypatch.setattr(
         "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
-    assert main(["pose_source", "block_on_block", *wrong]) == 2
+    assert main(["inspect", "depth", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
     assert said
     assert "Traceback" not in said

@@ -314,7 +314,7 @@ def test_bad_noise_files_are_refused(
     with pytest.raises(InputError, match=message) as raised:
         make_noise(str(path), NOISE_LEVEL)
     assert str(path) in str(raised.value)
-    assert main(["noise", "card", str(path)]) == 2
+    assert main(["noise", "show", str(path)]) == 2
     assert capsys.readouterr().err == f"apo-bench: {raised.value}\n"
 
 

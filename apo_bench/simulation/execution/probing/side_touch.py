@@ -1,11 +1,9 @@
 """Touch a fixed wall with the side of a held part, before it is inserted from above."""
 
 from apo_bench.geometry import Array
-from apo_bench.simulation.execution.probing.lay_flat import LAY_SPEED
 from apo_bench.simulation.execution.probing.state import ProbingState
 from apo_bench.simulation.execution.probing.touching import BEYOND_M, SPEED
-from apo_bench.simulation.execution.side_touches import STAND_OFF_M
-from apo_bench.simulation.execution.side_touches import SideTouch
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M, SideTouch
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot import (
     Robot,
@@ -20,7 +18,9 @@ from apo_bench.simulation.robot import (
 from apo_bench.simulation.scene import allow_sleep
 
 _CARRY = 0.4
-"""Peak speeds, [m/s]."""
+"""Peak speed of the part in the air, [m/s]."""
+_DOWN = 0.2
+"""Peak speed down to the wall, to it and up again, [m/s]."""
 
 
 def touch_side(
@@ -37,9 +37,9 @@ def touch_side(
     T = place.T @ grip.T_part_tip
     high = max(t.safe, float(T[2, 3]))
     robot.macro = "touch-wall"
-    robot.follow(smooth(robot.T, with_height(robot.T, high), LAY_SPEED))
+    robot.follow(smooth(robot.T, with_height(robot.T, high), _DOWN))
     robot.go(with_height(T, high), _CARRY)
-    robot.follow(smooth(robot.T, T, LAY_SPEED))
+    robot.follow(smooth(robot.T, T, _DOWN))
     robot.stand()
     touches = []
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
@@ -51,6 +51,6 @@ def touch_side(
             n, d = probing.plane_by_camera(place.normal, place.edge)
             touches = [probing.touch(robot, n, d, place.point, (operation, held))]
         probing.wrist.hold()
-        robot.follow(smooth(robot.T, T, LAY_SPEED))
-    robot.follow(smooth(robot.T, with_height(T, high), LAY_SPEED))
+        robot.follow(smooth(robot.T, T, _DOWN))
+    robot.follow(smooth(robot.T, with_height(T, high), _DOWN))
     return probing.grip(operation, touches, held, grip)

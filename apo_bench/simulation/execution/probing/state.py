@@ -21,19 +21,15 @@ from apo_bench.simulation.scene import Scene
 
 TOUCH_SIGMA_M = 3e-5
 """How exactly a guarded touch tells a plane, [m]."""
-
 FOOT_SIGMA_M = 1e-4
 """How exactly a foot of a part that was laid flat stands on the floor, [m]: pressed on, it sinks by as much."""
-
 SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
-
 _CORNERS = 3
 _FLAT_M = 1e-5
 """Which corner of the hand touched is asked so often, as what is estimated changes; a patch that lies within the second
 touched with its middle."""
-
 _OFF_SIGMAS = 3.0
 _TOUCH_N = 2.0
 _SIGMAS = 6.0

@@ -32,18 +32,14 @@ from apo_bench.simulation.scene import allow_sleep
 
 SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
-
 BEYOND_M = 0.001
 """The floor or a wall is felt for so much farther beyond where it is expected than before."""
-
 _DOWN = 0.4
 _OVER = 0.8
 _BACK = 0.3
 """Peak speeds of the empty hand, [m/s]."""
-
 _HALF_TURN = 3.0
 """A hand that turns by more passes by its rest, [rad]: the shorter way may lead over where the wrist ends."""
-
 _HIGH_M = 0.1
 """The hand passes from one place to the next so far above them."""
 

@@ -1,4 +1,4 @@
-"""The command `apo-bench plan`: how every operation is done. Only `--arm` and `--acts` need a simulator."""
+"""The command `apo-bench inspect plan`: how every operation is done. Only `--arm` and `--acts` need a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Any

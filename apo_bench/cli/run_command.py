@@ -1,4 +1,4 @@
-"""The command `apo-bench replay`: one trial with all that can be told of it."""
+"""The command `apo-bench run`: one trial with all that can be told of it."""
 
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,7 @@ from apo_bench.io import redirect_output
 
 
 @takes(trial_options())
-def run_replay(
+def run_command(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,

@@ -1,4 +1,4 @@
-"""The command `apo-bench scene`: the scene of a scenario as one file of MuJoCo."""
+"""The command `apo-bench inspect scene`: the scene of a scenario as one file of MuJoCo."""
 
 from pathlib import Path
 from typing import Annotated, Any

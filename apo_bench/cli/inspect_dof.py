@@ -1,4 +1,4 @@
-"""The command `apo-bench explain`: what the contacts determine. Only its picture needs a simulator."""
+"""The command `apo-bench inspect dof`: what the contacts determine. Only its picture needs a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +13,7 @@ from apo_bench.formats.observation import as_planned, read_observation_file
 from apo_bench.scenario.file import load_scenario
 
 
-def explain_command(
+def dof_command(
     scenario: ScenarioArgument,
     observation: Annotated[
         Path | None, typer.Option(help="At the corrected goals of this .json or .csv; default: the nominal ones.")

@@ -1,4 +1,4 @@
-"""The command `apo-bench graph`: the relation graph of a scenario. It needs no simulator."""
+"""The command `apo-bench inspect graph`: the relation graph of a scenario. It needs no simulator."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""The command `apo-bench recognise`: contacts from poses."""
+"""The command `apo-bench detect-contacts`: contacts from poses."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ from apo_bench.scenario.file import load_scenario
 
 
 @takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
-def recognise_command(
+def detect_contacts_command(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,

@@ -1,4 +1,4 @@
-"""The command `apo-bench eye`: poses from depth images of a demonstration."""
+"""The command `apo-bench inspect depth`: poses from depth images of a demonstration."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.printing import console, print_json, say
 
 
-def eye_command(
+def depth_command(
     scenario: ScenarioArgument,
     noise_level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Which demonstration.")] = 0,

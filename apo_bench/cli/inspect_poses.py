@@ -1,4 +1,4 @@
-"""The command `apo-bench show`: a picture of what is believed."""
+"""The command `apo-bench inspect poses`: a picture of what is believed."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Scenario
 
 
 @takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
-def show_command(
+def poses_command(
     scenario: ScenarioArgument,
     *,
     out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
