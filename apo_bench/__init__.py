@@ -33,6 +33,7 @@ _EXPORTS = MappingProxyType(
         "Correction": "apo_bench.assembly.correction_record",
         "Criteria": "apo_bench.records.thresholds",
         "Demonstration": "apo_bench.assembly.goals",
+        "Flatten": "apo_bench.envs.flatten",
         "Film": "apo_bench.simulation.scene.render",
         "InputError": "apo_bench.errors",
         "Layout": "apo_bench.assembly.goals",

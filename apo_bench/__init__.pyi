@@ -14,6 +14,7 @@ from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
+from apo_bench.envs.flatten import Flatten as Flatten
 from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict

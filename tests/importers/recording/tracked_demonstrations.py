@@ -20,7 +20,7 @@ from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import part_pose
 from apo_bench.trial.stages import DEMONSTRATION, LAYOUT, scene_of, stream
-from benchmarks.recording_forms import RATE_HZ, Tracked
+from tests.importers.recording.log_forms import RATE_HZ, Tracked
 
 BEGINS_S = 100.0
 """What the tracker's clock says then."""
