@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.correction.calibration import UNKNOWN, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
@@ -86,8 +86,8 @@ def probing_config(
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if stated is None else robot_sigmas(stated)
-    belief = believe(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(belief, slip_sigmas(sigmas), seed, ft_sensor, actions)
+    estimate = prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
+    return ProbingConfig(estimate, slip_sigmas(sigmas), seed, ft_sensor, actions)
 
 
 MEASURED: TrialRecord = {"noise_mm": None, "noise_deg": None, "human_error_scale": None, "noise": "measured"}

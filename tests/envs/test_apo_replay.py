@@ -188,7 +188,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
         def __call__(self, seen: Observation) -> Any:
             return pytest.fail("it can look again")
 
-        def looking(self, seen: Observation, look: Any) -> Any:
+        def correct_and_reobserve(self, seen: Observation, look: Any) -> Any:
             again.append(look([1]))
             return correct(seen, "contact")
 

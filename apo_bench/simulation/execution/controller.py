@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, goals_in_force
+from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, poses_in_force
 from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
 from apo_bench.simulation.execution.execution import Execution, failed_outcome, moves_with_error
@@ -77,7 +77,7 @@ def replay(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in goals_in_force(plan):
+    for upto, goals in poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return failed_outcome(plan, "plan", "unstable_goal", k)
