@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Assembly, InputError, Observation, correct, detect_contacts, draw_layout, load_scenario
+from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Solid, pose
