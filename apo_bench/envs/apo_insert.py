@@ -35,7 +35,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.robot import Halt
+from apo_bench.simulation.robot import ExecutionAborted
 from apo_bench.simulation.scene import Scene, build_scene, data_with_arm
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
@@ -300,8 +300,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             self._best = min(before, -float(control.feel.tip[2]))
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
-        except Halt as halt:
-            info = self._ended_by(halt.code, halt.part)
+        except ExecutionAborted as aborted:
+            info = self._ended_by(aborted.code, aborted.part)
         self._over = bool(info)
         truncated = self._over and self._out_of_time
         info = info or {"success": False}
