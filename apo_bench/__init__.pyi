@@ -1,12 +1,14 @@
 """Static types of what `apo_bench` exports; `__init__.py` imports each name when it is first asked for."""
 
 from apo_bench.assembly.correction_record import Correction as Correction
-from apo_bench.assembly.goals import Demonstration as Demonstration
-from apo_bench.assembly.goals import Layout as Layout
-from apo_bench.assembly.goals import Observation as Observation
-from apo_bench.assembly.goals import Plan as Plan
+from apo_bench.assembly.demonstration import Demonstration as Demonstration
+from apo_bench.assembly.demonstration import Layout as Layout
+from apo_bench.assembly.observation import Observation as Observation
+from apo_bench.assembly.plan import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.evaluation import evaluate as evaluate
+from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
@@ -14,6 +16,7 @@ from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
+from apo_bench.envs.flatten import Flatten as Flatten
 from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict

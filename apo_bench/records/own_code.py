@@ -42,10 +42,10 @@ def describe_own_code(records: Iterable[Mapping[str, Any]]) -> str:
     found = [names for record in records if record["success"] is False and (names := own_code(record))]
     if not found:
         return ""
-    names = list(dict.fromkeys(name for each in found for name in each))
-    more = f" and {len(names) - _MOST} more" * (len(names) > _MOST)
+    distinct = list(dict.fromkeys(name for each in found for name in each))
+    more = f" and {len(distinct) - _MOST} more" * (len(distinct) > _MOST)
     many = "1 failed trial names" if len(found) == 1 else f"{len(found):,} failed trials name"
     return (
-        f"{many} code that does not come with the package ({', '.join(names[:_MOST])}{more}); a report runs it only "
+        f"{many} code that does not come with the package ({', '.join(distinct[:_MOST])}{more}); a report runs it only "
         "with --trust-code"
     )

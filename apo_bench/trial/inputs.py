@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.io import opened
-from apo_bench.names import admit
+from apo_bench.names import find_own_module
 from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.records.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
@@ -107,9 +107,8 @@ def module_files(module: str) -> tuple[Path, ...]:
 
     Of a module that is installed among other packages, only its own package counts.
     """
-    admit(module)
     top = module.partition(".")[0]
-    spec = find_spec(top)
+    spec = find_spec(top) or find_own_module(top)
     if spec is None or not spec.has_location or spec.origin is None:
         return ()
     home = Path(spec.origin).parents[spec.submodule_search_locations is not None]

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.assembly import Correction, Look, Observation, Outcome, Plan, largest_gap
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reobserver, largest_gap
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
 from apo_bench.records import with_simulated
@@ -35,7 +35,7 @@ def apply_method(
     method: Any,
     observation: Observation,
     truth: Array | None,
-    look: Look | None = None,
+    reobserve: Reobserver | None = None,
     where: Scene | Scenario | None = None,
 ) -> MethodResult:
     """Make the plan of a method.
@@ -45,7 +45,7 @@ def apply_method(
             `where`; anything else is a corrector or names one.
         observation: As the planner has it: its contacts may be missing, false or detected, and are those of the plan.
         truth: (n, 4, 4) poses of the layout, world frame, [m]; only the oracle reads them.
-        look: With it a corrector observes operations again.
+        reobserve: With it a corrector observes operations again.
         where: What the plan of a corrector is executed in: it is moved along free directions so that it fits there.
             None: it stays as the corrector made it.
     """
@@ -57,7 +57,7 @@ def apply_method(
             return _uncorrected(observation, fit_nominal_poses(scenario.goals, observation), None)
         if method == "uncorrected" or (method == "nominal" and where is not None):
             return _uncorrected(observation, observation.poses, observation_failure(observation))
-    correction = correct(observation, with_simulated(method), look)
+    correction = correct(observation, with_simulated(method), reobserve)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)

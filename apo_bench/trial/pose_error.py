@@ -5,7 +5,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Poses, Reached
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers import LENGTH_M
-from apo_bench.geometry import Array, pose, turned_alike
+from apo_bench.geometry import Array, pose, turn_alike
 
 _RANK_CUT_OFF = 1e-7
 """At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
@@ -56,9 +56,7 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
-    return np.array([T if solid is None else turned_alike(solid, T, true) for solid, T, true in pairs]).reshape(
-        -1, 4, 4
-    )
+    return np.array([T if solid is None else turn_alike(solid, T, true) for solid, T, true in pairs]).reshape(-1, 4, 4)
 
 
 def _rms_mm(error: Array, operations: int) -> float:

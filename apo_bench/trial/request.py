@@ -208,7 +208,7 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
         observation = _observe(config, scene, simulated)
     rollout = trial_story(config, scene, observation, track, record, simulated)
     if request.video:
-        write_film(scene.scenario.assembly, rollout.assembled, rollout.chapters, request.video)
+        write_film(scene.scenario.assembly, rollout.assembled, rollout.segments, request.video)
     if show is not None:
         show(rollout)
     return record

@@ -11,7 +11,7 @@ from typing import Any, cast, final
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Plan
-from apo_bench.correction.calibration import UNKNOWN, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
@@ -32,8 +32,8 @@ from apo_bench.records import (
 )
 from apo_bench.records.run.validation import unwritable
 from apo_bench.scenario import scenario_names
-from apo_bench.simulation.execution import ReplayCache
-from apo_bench.simulation.execution.probing.feeling import ACTS, ProbingConfig
+from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
@@ -205,17 +205,8 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
         assumed = assumed_error(config.assumed_robot_error, config.robot_error)
         key = stream_key(config.seed, WRENCH, config.secret_seed)
         probing = probing_config(plan, scene, assumed, key, config.ft_sensor)
-    attempt = replay_and_judge(
-        plan,
-        scene,
-        reference,
-        context.callbacks,
-        config.fidelity,
-        context.cache,
-        spiral,
-        error=error,
-        probing=probing,
-    )
+    execution = ExecutionConfig(config.fidelity, spiral, robot_error=error, probing=probing)
+    attempt = replay_and_judge(plan, scene, reference, context.callbacks, execution, context.cache)
     end = end_record(trial_outcome(attempt), success=attempt.verdict.success)
     return end | {"joint_control": scene.arm.control} | replay_columns(attempt, plan, truth)
 
@@ -245,7 +236,7 @@ def probing_config(
     assumed: str | None,
     seed: tuple[int, ...],
     ft_sensor: str = USUAL_FT_SENSOR,
-    acts: tuple[str, ...] = ACTS,
+    actions: tuple[str, ...] = PROBING_ACTIONS,
 ) -> ProbingConfig:
     """How a robot probes: with assumed standard deviations of its errors, never with the errors themselves.
 
@@ -253,14 +244,14 @@ def probing_config(
         assumed: Standard deviations, as in a record; None: usual ones.
         seed: Of the noise of the force-torque sensor.
         ft_sensor: As in a record.
-        acts: What else it does.
+        actions: Of `PROBING_ACTIONS`.
 
     Raises:
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if assumed is None else robot_sigmas(assumed)
-    belief = believe(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(belief, slip_sigmas(sigmas), seed, ft_sensor, acts)
+    estimate = prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
+    return ProbingConfig(estimate, slip_sigmas(sigmas), seed, ft_sensor, actions)
 
 
 def record_trial(

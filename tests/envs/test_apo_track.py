@@ -108,7 +108,7 @@ def test_the_corrector_of_the_paper_is_a_policy(name: str) -> None:
         assert (reward, info["code"], asked.status) == (1.0, "ok", "converged")
         assert env.schedule == asked.schedule
         np.testing.assert_allclose(env.placed, asked.poses, rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(np.array(env._targets), asked.step_poses, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(np.array(env._step_poses), asked.step_poses, rtol=0.0, atol=1e-9)
 
 
 def test_without_correction_contacts_are_open(env: APOTrack) -> None:

@@ -118,7 +118,7 @@ def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> 
     worse = pickle.loads(pickled).reset(seed=SEED, options={"noise_level": 3})
     assert same(worse, APOReplay(SMALL, pose_source="depth-camera", noise_level=3).reset(seed=SEED))
     assert not same(worse, usual)
-    with pytest.raises(InputError, match="one number is allowed, mm per ray"):
+    with pytest.raises(InputError, match="give one number, mm per ray"):
         env.reset(options={"noise_level": (1, 1)})
 
 
@@ -155,10 +155,10 @@ def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'level'. Known: careless, clearance_mm, level"),
-        ([("noise_level", 1)], "a dict with level, careless, clearance_mm is allowed"),
-        ({"noise_level": None}, "the level None was given"),
-        ({"noise_level": 2, "human_error_scale": 11}, "carelessness of 11"),
+        ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'noise_level'. Known: clearance_mm, human"),
+        ([("noise_level", 1)], "a dict with trial, noise_level, human_error_scale, clearance_mm is"),
+        ({"noise_level": None}, "the noise level None was given"),
+        ({"noise_level": 2, "human_error_scale": 11}, "human error scale of 11"),
         ({"noise_level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
     ],
 )

@@ -20,7 +20,6 @@ from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import (
     KEY,
-    NOISE_LEVEL,
     RECORD_FIELDS,
     RECORD_SCHEMA,
     REQUIRED,

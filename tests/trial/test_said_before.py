@@ -31,7 +31,7 @@ SAID = (
     "gap_after_mm",
     "fit_adjustments",
     "corrected_operations",
-    "tried",
+    "tried_corrections",
     "chi_square",
     "sentence",
 )
