@@ -7,6 +7,8 @@ from apo_bench.assembly.observation import Observation as Observation
 from apo_bench.assembly.plan import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.evaluation import evaluate as evaluate
+from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
