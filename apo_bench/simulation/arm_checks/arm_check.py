@@ -26,11 +26,7 @@ _PUSH_N = 5.0
 _PUSH_S = 0.5
 """Stiffness is looked at by this push, which lasts so long."""
 _LAYOUTS = 20
-_MOST_GIVING_M = 0.002
 _LEAST_MARGIN_DEG = 5.0
-_MOST_TURN_DEG = 5.0
-_LEAST_EVENNESS = 0.3
-"""Of two pads on a part that stands fast between them; hands that held parts well had 0.45 at least."""
 _LEVER_M = 0.1
 
 
@@ -140,22 +136,6 @@ def unsaid(arm: Arm) -> list[str]:
         missing.append("the torque of a joint has no limit in the model; state 'torque_nm'.")
     if arm.hand is not None and not arm.hand.graded:
         missing.append("the gripper knows open and closed only: it opens fully beside other parts.")
-    if arm.hand is not None and arm.hand.gives_m > _MOST_GIVING_M:
-        missing.append(
-            f"the fingers give way by {1e3 * arm.hand.gives_m:.1f} mm on a part of half their opening, so it is lost; "
-            "take a gripper whose linkage is stiff, or a softer 'closed'."
-        )
-    if arm.hand is not None and arm.hand.evenness < _LEAST_EVENNESS:
-        missing.append(
-            f"of two pads on a part the weaker pushes {100 * arm.hand.evenness:.0f} % as hard as the other, so the "
-            "part is moved aside: the coupling of the fingers gives way; give its <equality> a stiffer 'solref', or "
-            "drive both fingers."
-        )
-    if arm.hand is not None and arm.hand.turns_deg > _MOST_TURN_DEG:
-        missing.append(
-            f"the pads turn by {arm.hand.turns_deg:.1f} degrees while the gripper closes to half, so that they hold by "
-            "their edges; take a gripper that keeps its pads parallel."
-        )
     return missing
 
 
