@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from apo_bench.benchmark.analysis import Cell, Rate
+from apo_bench.benchmark.analysis import ConditionResult, Rate
 from apo_bench.records import TrialConfig
 
 TOLD_LEVEL = 1.0
@@ -37,18 +37,18 @@ WORDS = {
 class Look(NamedTuple):
     """What the sentence and the figure are made of."""
 
-    cells: Sequence[Cell]
+    cells: Sequence[ConditionResult]
     corrected: str
     """`contact-robust`, or `contact` of rows that lack it."""
 
 
-def look_at(cells: Sequence[Cell]) -> Look:
+def look_at(cells: Sequence[ConditionResult]) -> Look:
     methods = {cell.method for cell in cells}
     return Look(cells, "contact-robust" if "contact-robust" in methods else "contact")
 
 
 def pooled(
-    cells: Iterable[Cell],
+    cells: Iterable[ConditionResult],
     method: str,
     noise_mm: float,
     noise: str = TrialConfig.noise,
@@ -74,7 +74,7 @@ def robot_rate(look: Look, method: str, error: str) -> Rate | None:
     return pooled(look.cells, method, noise_mm, robot_error=error, scenarios=robot_scenarios(look.cells))
 
 
-def robot_scenarios(cells: Iterable[Cell]) -> list[str]:
+def robot_scenarios(cells: Iterable[ConditionResult]) -> list[str]:
     return sorted({cell.scenario for cell in cells if cell.robot_error != TrialConfig.robot_error})
 
 

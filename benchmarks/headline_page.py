@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import Cell, Paired
-from apo_bench.benchmark.sweeps.grid import described, load_all
+from apo_bench.benchmark.analysis import ConditionResult, Paired
+from apo_bench.benchmark.sweeps.grid import describe_grids, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.records import SETTINGS, TrialConfig
 from benchmarks.headline_look import TOLD_LEVEL, Look, block, robot_scenarios
@@ -118,19 +118,19 @@ def up_to_date(ran: Mapping[str, Any]) -> bool:
         for name in ("ft_sensor", "assumed_robot_error", "min_predicted_success")
     }
     kept = [{**usual, **grid} for grid in ran["grids"]]
-    return described(grids, load_all(grids)) == kept
+    return describe_grids(grids, load_all(grids)) == kept
 
 
-def section(title: str, said: str, heads: tuple[str, str], cells: Sequence[Cell]) -> list[str]:
+def section(title: str, said: str, heads: tuple[str, str], cells: Sequence[ConditionResult]) -> list[str]:
     """A table over noises or robot errors; nothing where none was run."""
 
-    def row(cell: Cell) -> tuple[str, ...]:
+    def row(cell: ConditionResult) -> tuple[str, ...]:
         return f"`{cell.noise if heads[0] == 'noise' else cell.robot_error}`", f"`{cell.method}`"
 
     return [title, "", said, "", *together(cells, heads, row), ""] if cells else []
 
 
-def in_order(cell: Cell) -> tuple[Any, ...]:
+def in_order(cell: ConditionResult) -> tuple[Any, ...]:
     """Humans, scenarios or noises, methods from what was seen to what is corrected, levels."""
     return (
         cell.human_error_scale,
@@ -141,16 +141,16 @@ def in_order(cell: Cell) -> tuple[Any, ...]:
     )
 
 
-def by_error(cell: Cell) -> tuple[Any, ...]:
+def by_error(cell: ConditionResult) -> tuple[Any, ...]:
     """Errors from none to the largest, then methods."""
     return cell.robot_error != TrialConfig.robot_error, cell.robot_error, [*ROBOT_METHODS].index(cell.method)
 
 
-def of_robot(cell: Cell, scenarios: Sequence[str]) -> bool:
+def of_robot(cell: ConditionResult, scenarios: Sequence[str]) -> bool:
     """Whether a cell has an error of the robot, or is the same without one."""
     same = cell.scenario in scenarios and cell.noise == TrialConfig.noise and cell.human_error_scale == 0.0
     return same and ROBOT_METHODS.get(cell.method) == cell.noise_mm
 
 
-def named(cell: Cell) -> tuple[str, ...]:
+def named(cell: ConditionResult) -> tuple[str, ...]:
     return cell.scenario, f"`{cell.method}`"

@@ -6,14 +6,19 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import Cell, Paired, Rate, read_timing, wilson
+from apo_bench.benchmark.analysis import ConditionResult, Paired, Rate, read_timing, wilson
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.records import is_uncorrected
 
-Of = Callable[[Cell], Hashable]
+Of = Callable[[ConditionResult], Hashable]
 
 
-def rates(cells: Sequence[Cell], heads: Sequence[str], row: Callable[[Cell], tuple[str, ...]], column: Of) -> list[str]:
+def rates(
+    cells: Sequence[ConditionResult],
+    heads: Sequence[str],
+    row: Callable[[ConditionResult], tuple[str, ...]],
+    column: Of,
+) -> list[str]:
     """Success in percent: a line per `row`, in the order of the cells, and a column per `column`, sorted.
 
     Args:
@@ -34,7 +39,7 @@ def rates(cells: Sequence[Cell], heads: Sequence[str], row: Callable[[Cell], tup
     ]
 
 
-def both(cell: Cell) -> str:
+def both(cell: ConditionResult) -> str:
     """Success in percent, and what is as demonstrated where that is less."""
     success, shown = (f"{100 * (rate or 0.0):.0f}" for rate in (cell.rate, cell.demonstrated_rate))
     return success if success == shown else f"{success} ({shown})"
@@ -49,17 +54,19 @@ def widths(trials: int) -> str:
     )
 
 
-def whole(cells: Iterable[Cell]) -> str:
+def whole(cells: Iterable[ConditionResult]) -> str:
     """Success of several cells together, with its interval."""
     here = list(cells)
     rate = Rate(sum(cell.successes for cell in here), sum(cell.trials for cell in here))
     return f"{rate.successes} of {rate.trials} ({100 * rate.interval.low:.0f} to {100 * rate.interval.high:.0f} %)"
 
 
-def together(cells: Sequence[Cell], heads: Sequence[str], row: Callable[[Cell], tuple[str, ...]]) -> list[str]:
+def together(
+    cells: Sequence[ConditionResult], heads: Sequence[str], row: Callable[[ConditionResult], tuple[str, ...]]
+) -> list[str]:
     """As `rates`, with a column per scenario, and one of all with its interval."""
     lines = rates(cells, heads, row, lambda cell: cell.scenario)
-    groups: dict[tuple[str, ...], list[Cell]] = {}
+    groups: dict[tuple[str, ...], list[ConditionResult]] = {}
     for cell in cells:
         groups.setdefault(row(cell), []).append(cell)
     added = ["all |", "---|", *(f"{whole(own)} |" for own in groups.values())]
@@ -68,7 +75,7 @@ def together(cells: Sequence[Cell], heads: Sequence[str], row: Callable[[Cell], 
 
 def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
     """Cells in which a method that corrects ends otherwise than `paper` at any seed."""
-    asked = [p for p in pairs if p.place.method in methods and not is_uncorrected(p.place.method) and p.pairs]
+    asked = [p for p in pairs if p.condition.method in methods and not is_uncorrected(p.condition.method) and p.pairs]
     apart = [p for p in asked if p.only_method or p.only_reference]
     lines = [
         f"Corrected poses against those of `paper` over the same seeds, in the {len(apart)} of {len(asked)} cells in "
@@ -79,7 +86,7 @@ def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for p in apart:
-        at = p.place
+        at = p.condition
         low, high = (100 * x for x in p.interval)
         lines.append(
             f"| {at.scenario} | {'human_error_scale' if at.human_error_scale else 'careful'} | {at.noise_mm:g} | {at.noise} | `{at.method}` "

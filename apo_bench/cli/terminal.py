@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from apo_bench.benchmark.analysis import Cell, confusions
-from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.analysis import ConditionResult, confusions
+from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
 from apo_bench.benchmark.report.tables.table import Column
 from apo_bench.benchmark.report.tables.table import Table as Data
@@ -36,7 +36,7 @@ def print_table(table: Data) -> None:
 
 
 def print_scenarios(scenarios: Sequence[Scenario]) -> None:
-    """Name, operations, title and place in the paper of each."""
+    """Name, operations, title and condition in the paper of each."""
     columns = (
         Column("name", "scenario", words=True),
         Column("operations", "operations", lambda s: len(s.assembly), words=True),
@@ -46,9 +46,9 @@ def print_scenarios(scenarios: Sequence[Scenario]) -> None:
     print_table(Data(scenarios, columns))
 
 
-def print_cells(cells: Sequence[Cell]) -> None:
+def print_cells(cells: Sequence[ConditionResult]) -> None:
     """Success rates with their intervals."""
-    print_table(cell_table(cells))
+    print_table(condition_table(cells))
     excluded = sum(c.excluded for c in cells)
     if excluded:
         left = "1 row is" if excluded == 1 else f"{excluded:,} rows are"

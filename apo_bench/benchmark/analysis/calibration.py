@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import rank, rank_contact_source
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import rank, rank_contact_source
 from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
 from apo_bench.records import knows_truth
 from apo_bench.records.run.trials import Trials, trials_of

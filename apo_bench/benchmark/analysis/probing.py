@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import Condition, by_condition
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import Place, by_place
 from apo_bench.benchmark.analysis.rates import Records, root_mean_square
 from apo_bench.records import assumed_error, robot_sigmas
 from apo_bench.records.run.trials import Trials, trials_of
@@ -19,15 +19,15 @@ def felt(records: Records) -> list[Line]:
     """
     trials = trials_of(records)
     own = trials.where(~np.isnan(trials.number("probe_contacts")))
-    return [_line(place, felt_there) for place, felt_there in by_place(own).items()]
+    return [_line(condition, felt_there) for condition, felt_there in by_condition(own).items()]
 
 
-def _line(place: Place, trials: Trials) -> Line:
-    told = assumed_error(place.assumed_robot_error, place.robot_error)
-    drawn_mm, drawn_deg = _as_vector(place.robot_error)
+def _line(condition: Condition, trials: Trials) -> Line:
+    told = assumed_error(condition.assumed_robot_error, condition.robot_error)
+    drawn_mm, drawn_deg = _as_vector(condition.robot_error)
     stated_mm, stated_deg = (None, None) if told is None else _as_vector(told)
     return {
-        "place": place,
+        "condition": condition,
         "trials": len(trials),
         "probe_contacts": float(trials.number("probe_contacts").mean()),
         "refused": int(trials.number("probe_contacts_rejected").sum()),

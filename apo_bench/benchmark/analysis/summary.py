@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 from apo_bench.benchmark.analysis.half_level import HalfLevel, half_levels
 from apo_bench.benchmark.analysis.paired import REFERENCES, Paired, paired
-from apo_bench.benchmark.analysis.rates import Cell, Records, tally
+from apo_bench.benchmark.analysis.rates import ConditionResult, Records, tally
 from apo_bench.records.run.trials import trials_of
 
 
 class Summary(NamedTuple):
     """Each sorted as `tally` sorts; nothing of it depends on chance or on the order of records."""
 
-    cells: tuple[Cell, ...]
+    cells: tuple[ConditionResult, ...]
     pairs: tuple[Paired, ...]
     half_levels: tuple[HalfLevel, ...]
 

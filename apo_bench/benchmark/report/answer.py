@@ -10,8 +10,8 @@ from functools import reduce
 import numpy as np
 
 from apo_bench.benchmark.analysis import (
+    CONDITION_FIELDS,
     FEWEST_SEEDS,
-    PLACE_FIELDS,
     Contrast,
     HalfLevel,
     Records,
@@ -33,7 +33,7 @@ _AGAINST = ("uncorrected", "paper", "contact", CORRECTOR)
 """The best method is compared with these; if none of them was tried, with the next best."""
 _GIVEN = "given"
 _SAME_TRIAL = (
-    *(name for name in PLACE_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
+    *(name for name in CONDITION_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
     "seed",
 )
 _Who = tuple[str, int]
@@ -55,7 +55,7 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
     half = [
         h
         for h in half_levels
-        if (h.place.method, h.place.max_reobservations) == best and h.place.contact_source in kinds
+        if (h.condition.method, h.condition.max_reobservations) == best and h.condition.contact_source in kinds
     ]
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
     reached = _reach(half) if own.seeds >= FEWEST_SEEDS else ""
@@ -83,7 +83,7 @@ def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
 
 
 def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
-    """The best first, by trials that all have that were tried in half of all places or more."""
+    """The best first, by trials that all have that were tried in half of all conditions or more."""
     most = max(len(own.trial) for own in results.values())
     widely = {who: own for who, own in results.items() if 2 * len(own.trial) >= most}
     common = reduce(np.intersect1d, (own.trial for own in widely.values()))

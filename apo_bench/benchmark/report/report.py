@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.benchmark.analysis import (
-    Cell,
+    ConditionResult,
     Line,
     Summary,
     calibrations,
@@ -24,7 +24,7 @@ from apo_bench.benchmark.report.answer import answer
 from apo_bench.benchmark.report.figures.figures import figures
 from apo_bench.benchmark.report.page.report_page import Contents, report_page
 from apo_bench.benchmark.report.pictures import Draw, Pictures, draw_failures
-from apo_bench.benchmark.report.tables.cells import cell_table, half_table, pair_table
+from apo_bench.benchmark.report.tables.conditions import condition_table, half_table, pair_table
 from apo_bench.benchmark.report.tables.methods import (
     calibration_table,
     confusion_table,
@@ -66,7 +66,7 @@ class Report(NamedTuple):
     Parquet, where the package pyarrow is installed."""
     figures: tuple[Path, ...]
     """All, as SVG, and as PNG where people put them into text."""
-    cells: tuple[Cell, ...]
+    cells: tuple[ConditionResult, ...]
     confusions: Sequence[Line]
     pictures: int
     """Failures that were drawn."""
@@ -118,7 +118,7 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
     run = read_run(folder)
     timing = read_timing(folder)
     tables = {
-        "cells": cell_table(numbers.cells),
+        "cells": condition_table(numbers.cells),
         "pairs": pair_table(numbers.pairs),
         "half_levels": half_table(numbers.half_levels),
         "gaps": gap_table(gaps(trials)),

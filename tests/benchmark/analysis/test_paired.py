@@ -18,7 +18,7 @@ from statsmodels.stats.multitest import multipletests
 from apo_bench.benchmark.analysis import tango, wilson
 from apo_bench.benchmark.analysis.paired import holm, mcnemar, paired
 from apo_bench.benchmark.report.report import report
-from apo_bench.benchmark.report.tables.cells import pair_table
+from apo_bench.benchmark.report.tables.conditions import pair_table
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -104,7 +104,7 @@ def test_adjustment_only_raises_and_keeps_the_order(p: list[float]) -> None:
 
 def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
     """`none` against `paper` and `paper` against `none` are one of three comparisons, not two of four."""
-    found = {(p.place.method, p.reference): p for p in paired(rows())}
+    found = {(p.condition.method, p.reference): p for p in paired(rows())}
     assert found["uncorrected", "paper"].p == found["paper", "uncorrected"].p == mcnemar(7, 0)
     assert found["uncorrected", "paper"].p_adjusted == found["paper", "uncorrected"].p_adjusted
     raised = holm({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
@@ -116,7 +116,7 @@ def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
 def test_what_is_mended_and_what_is_spoilt() -> None:
     """The raw replay is right at seeds 0 to 3 of 10, the corrected one at 2 to 7: two spoilt of 4, four mended of 6."""
     given = [row("uncorrected", i, i < 4) for i in range(10)] + [row("contact", i, 2 <= i < 8) for i in range(10)]
-    (pair,) = [p for p in paired(given) if (p.place.method, p.reference) == ("contact", "uncorrected")]
+    (pair,) = [p for p in paired(given) if (p.condition.method, p.reference) == ("contact", "uncorrected")]
     assert (pair.both, pair.neither, pair.pairs) == (2, 2, 10)
     assert (pair.recovered, pair.harmed) == ((4, 6), (2, 4))
     assert (pair.recovered.rate, pair.harmed.interval) == (4 / 6, wilson(2, 4))
@@ -147,7 +147,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def test_discordant_pairs_are_counted_both_ways() -> None:
-    found = {(p.place.method, p.reference): p for p in paired([*rows(), row("oracle")])}
+    found = {(p.condition.method, p.reference): p for p in paired([*rows(), row("oracle")])}
     assert set(found) == {
         ("contact", "paper"),
         ("contact", "uncorrected"),
@@ -164,7 +164,7 @@ def test_discordant_pairs_are_counted_both_ways() -> None:
 def test_free_errors_are_compared_pair_by_pair() -> None:
     pair = paired(rows())[0]
     errors = {m: [r["planned_error_free_mm"] for r in rows() if r["method"] == m] for m in ("contact", "uncorrected")}
-    (pair,) = [p for p in paired(rows()) if (p.place.method, p.reference) == ("contact", "uncorrected")]
+    (pair,) = [p for p in paired(rows()) if (p.condition.method, p.reference) == ("contact", "uncorrected")]
     expected = ttest_rel(errors["contact"], errors["uncorrected"]).confidence_interval(0.95)
     assert pair.free_mm == pytest.approx(np.mean(errors["contact"]) - np.mean(errors["uncorrected"]))
     assert pair.free_interval == pytest.approx((expected.low, expected.high))
@@ -185,7 +185,7 @@ def test_none_is_the_reference_whatever_relations_were_told() -> None:
         row("contact", contact_source="false-positive"),
     ]
     found = paired([*given, row("paper"), row("contact", 0, False)])
-    assert [(p.place.contact_source, p.place.method, p.reference, p.difference) for p in found] == [
+    assert [(p.condition.contact_source, p.condition.method, p.reference, p.difference) for p in found] == [
         ("given", "uncorrected", "paper", -1.0),
         ("given", "contact", "paper", -1.0),
         ("given", "contact", "uncorrected", 0.0),

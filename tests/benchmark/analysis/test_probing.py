@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.analysis import felt, members, settings, tally
-from apo_bench.benchmark.analysis.paired import place_of_reference
-from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.analysis.paired import reference_condition
+from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import felt_table
 from tests.benchmark.analysis.test_rates import row
 
@@ -64,8 +64,8 @@ def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None
         ("wrist", ("contact", "contact+probe")),
     ]
     assert ["wrench cobot" in s.title for s in groups] == [s.ft_sensor == "joint-torque" for s in groups]
-    assert place_of_reference(cells[2], "uncorrected").ft_sensor == "wrist"
-    table = cell_table(cells)
+    assert reference_condition(cells[2], "uncorrected").ft_sensor == "wrist"
+    table = condition_table(cells)
     shown = [column.head for column in table.shown].index("ft_sensor")
     assert [line[shown] for line in table.lines] == ["any", "wrist", "joint-torque"]
     assert "assumed_robot_error" not in [column.head for column in table.shown]

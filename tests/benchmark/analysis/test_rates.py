@@ -18,7 +18,7 @@ from apo_bench.benchmark.analysis import Rate, confusions, efforts, members, sum
 from apo_bench.benchmark.analysis import settings as settings_of_cells
 from apo_bench.benchmark.report.figures.style import OWN_STYLES, STYLES
 from apo_bench.benchmark.report.report import report
-from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
 from apo_bench.records import RECORD_SCHEMA
 from tests import pages
@@ -260,7 +260,7 @@ def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: P
     assert [(c.method, c.max_reobservations, c.successes) for c in found.cells] == [
         *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
     ]
-    assert [(p.place.max_reobservations, p.only_method, p.only_reference) for p in found.pairs] == [
+    assert [(p.condition.max_reobservations, p.only_method, p.only_reference) for p in found.pairs] == [
         (0, 0, 1),
         (2, 1, 0),
         (4, 3, 0),
@@ -321,6 +321,6 @@ def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() 
         ("uncorrected", 2, 2),
         (wrong, 1, 0),
     ]
-    both, alone = ("\n".join(cell_table(cells).markdown()) for cells in ((right, other), (right,)))
+    both, alone = ("\n".join(condition_table(cells).markdown()) for cells in ((right, other), (right,)))
     assert wrong in both
     assert "robot" not in alone

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Cell, members, place_of, settings
+from apo_bench.benchmark.analysis import ConditionResult, condition_of, members, settings
 from apo_bench.benchmark.report.facts import run_facts
 from apo_bench.benchmark.report.figures.sheet import Figure
-from apo_bench.benchmark.report.page.cells import matrix, pack_trials
+from apo_bench.benchmark.report.page.matrix import matrix, pack_trials
 from apo_bench.benchmark.report.page.page import Section, as_data, page
 from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.benchmark.report.tables.table import Table
@@ -43,7 +43,7 @@ class Contents(NamedTuple):
     answer: str
     """The sentences at the top, with `code` marked."""
     trials: Trials
-    cells: Sequence[Cell]
+    cells: Sequence[ConditionResult]
     figures: Mapping[str, Figure]
     tables: Mapping[str, Table]
     run: Mapping[str, Any]
@@ -57,9 +57,9 @@ class Contents(NamedTuple):
 
 def report_page(c: Contents) -> str:
     """The page, as HTML."""
-    numbers = {cell.place: i for i, cell in enumerate(c.cells)}
-    shown = [(place_of(picture.row), picture.row["seed"]) for picture in c.pictures]
-    pictured = {f"{numbers[place]}:{seed}": k for k, (place, seed) in enumerate(shown) if place in numbers}
+    numbers = {cell.condition: i for i, cell in enumerate(c.cells)}
+    shown = [(condition_of(picture.row), picture.row["seed"]) for picture in c.pictures]
+    pictured = {f"{numbers[condition]}:{seed}": k for k, (condition, seed) in enumerate(shown) if condition in numbers}
     by_setting = members(settings(c.cells), c.cells)
     matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
@@ -100,8 +100,8 @@ def _pictures(c: Contents) -> list[tuple[str, Any]]:
 
 def _picture(c: Contents, number: int) -> dict[str, str]:
     row, jpeg, words = c.pictures[number]
-    place = place_of(row)
-    where = "" if place is None else f"{place.title}, level {place.noise_mm:g}, "
+    condition = condition_of(row)
+    where = "" if condition is None else f"{condition.title}, level {condition.noise_mm:g}, "
     return {
         "name": f"picture-{number}",
         "title": f"{row['method']}: {why(row)}.",

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from apo_bench.benchmark.analysis import Line, percent
-from apo_bench.benchmark.report.tables.table import Column, Table, interval_columns, place_columns
+from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, interval_columns
 
 _METHOD = (Column("scenario", "scenario", words=True), Column("method", "method", words=True))
 
@@ -14,13 +14,13 @@ def gap_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("trials", "n"),
-            Column("seen_5"),
-            Column("seen_median_mm", "as seen [mm]", text="{seen_median_mm:.3f}"),
-            Column("seen_95"),
+            Column("observed_5"),
+            Column("observed_median_mm", "observed [mm]", text="{observed_median_mm:.3f}"),
+            Column("observed_95"),
             Column("planned_5"),
-            Column("planned_median_mm", "as planned [mm]", text="{planned_median_mm:.3f}"),
+            Column("planned_median_mm", "planned [mm]", text="{planned_median_mm:.3f}"),
             Column("planned_95", "95 % are below [mm]", text="{planned_95:.3f}"),
         ),
         "No method that corrects had a plan, so there is no gap to compare.",
@@ -38,7 +38,7 @@ def felt_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("trials", "n"),
             Column("probe_contacts", "probe_contacts", text="{probe_contacts:.1f}"),
             Column("refused", "refused"),

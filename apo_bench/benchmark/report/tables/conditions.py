@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from apo_bench.benchmark.analysis import Cell, HalfLevel, Paired
-from apo_bench.benchmark.report.tables.table import Column, Table, endings, interval_columns, place_columns
+from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, Paired
+from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, endings, interval_columns
 from apo_bench.records import TrialConfig
 
 _AXES = (
@@ -18,7 +18,7 @@ _AXES = (
 """Shown to people where they are not as usual in some cell."""
 
 
-def cell_table(cells: Sequence[Cell]) -> Table:
+def condition_table(cells: Sequence[ConditionResult]) -> Table:
     """Axes that are as usual in every cell are left to files."""
     unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
     min_predicted_success = "min_predicted_success" in unusual
@@ -69,7 +69,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
     )
 
 
-def _all_endings(cell: Cell) -> str:
+def _all_endings(cell: ConditionResult) -> str:
     return endings(cell.failures, most=None)
 
 
@@ -78,7 +78,7 @@ def pair_table(pairs: Sequence[Paired]) -> Table:
     return Table(
         pairs,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("reference", "against", words=True),
             Column("pairs", "pairs"),
             Column("only_method"),
@@ -139,7 +139,7 @@ def half_table(levels: Sequence[HalfLevel]) -> Table:
     return Table(
         levels,
         (
-            *place_columns(levels=False),
+            *condition_columns(levels=False),
             Column("smallest_level", value="smallest"),
             Column("largest_level", value="largest"),
             Column("trials", "n"),
