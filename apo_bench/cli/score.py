@@ -181,7 +181,7 @@ def report_command(
         f"--pictures {pictures} was given; a whole number from 0 to {_MOST_PICTURES} is allowed.",
     )
     written = report(folder, pictures, secret_seed_file, trust_code=trust_code, draw=failure_pictures)
-    print_cells(written.cells)
+    print_cells(written.conditions)
     print_report(written)
 
 

