@@ -48,7 +48,7 @@ _EXPORTS = MappingProxyType(
         "build_scene": "apo_bench.simulation.scene.scene",
         "camera_view": "apo_bench.simulation.scene.render",
         "correct": "apo_bench.correction.correctors",
-        "correct_many": "apo_bench.correction.correctors",
+        "correct_many": "apo_bench.correction.batches",
         "demonstrate": "apo_bench.simulation.human.demonstration",
         "detect_contacts": "apo_bench.perception.detection.contacts",
         "draw_layout": "apo_bench.scenario.layout",

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Correction, Equations, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.status import as_it_ends
+from apo_bench.correction.checks.as_given import as_it_ends
 from apo_bench.correction.solvers import Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array, Box, pose

@@ -27,7 +27,8 @@ from apo_bench.assembly import (
     Suspect,
     project_observations,
 )
-from apo_bench.correction.checks.status import TEST_LEVEL, opposing, refused_correction, status_sentence
+from apo_bench.correction.checks.chi_square import TEST_LEVEL
+from apo_bench.correction.checks.status import opposing, refused_correction, status_sentence
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import Solved, pull, solve, tested
 from apo_bench.correction.contact.starts import best_start, turned_words

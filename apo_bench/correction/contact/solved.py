@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Observation, joint_covariance, largest
-from apo_bench.correction.checks.status import CONTRADICTION_M, ROUNDING, p_value, softened_chi_square
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, ROUNDING, p_value, softened_chi_square
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers import (
     NearestGoals,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, faces_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import CONTRADICTION_M, fit_deviation, p_value
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import problem_of, seen_system

@@ -18,7 +18,8 @@ from apo_bench.assembly import (
     largest_gap,
     project_observations,
 )
-from apo_bench.correction.checks.status import TEST_LEVEL, refused_correction
+from apo_bench.correction.checks.chi_square import TEST_LEVEL
+from apo_bench.correction.checks.status import refused_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.robust.beliefs import (
