@@ -10,6 +10,7 @@ from typing import NamedTuple
 from apo_bench.assembly import Observation
 from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
@@ -155,5 +156,6 @@ def _trial(
     score = plan_score(made.plan, explained, scene, settings.robot_error)
     error = draw_robot_error(settings.robot_error, scene, settings.seed)
     truth = simulated.layout.poses
-    attempt = replay_and_judge(made.plan, scene, truth, None, settings.fidelity, cache, error=error)
+    config = ExecutionConfig(settings.fidelity, robot_error=error)
+    attempt = replay_and_judge(made.plan, scene, truth, None, config, cache)
     return str(int(attempt.verdict.success)), trial_outcome(attempt).code, repr(score)

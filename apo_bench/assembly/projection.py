@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly.facing_round import WALLS, contact_kind
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import require
 from apo_bench.geometry import Array, Face, RoundFace, remembered
@@ -33,7 +33,7 @@ _BEHIND = "|"
 _SAME_M = 1e-9
 
 
-def lowered(assembly: Assembly) -> Assembly:
+def project_round_faces(assembly: Assembly) -> Assembly:
     """An assembly in which all contacts are of planes, with sheets for round faces; the same if it has none.
 
     Operations, ODLs and arcs are the same, solids too. `Assembly.given` says what each contact is part of.
@@ -44,16 +44,16 @@ def lowered(assembly: Assembly) -> Assembly:
     return _lowered(assembly) or assembly
 
 
-def lowered_observation(observation: Observation) -> Observation:
+def project_observation(observation: Observation) -> Observation:
     """An observation of such an assembly; the same if nothing is round."""
-    low = lowered(observation.assembly)
+    low = project_round_faces(observation.assembly)
     return observation if low is observation.assembly else replace(observation, assembly=low)
 
 
-def lowered_together(observations: Sequence[Observation]) -> Sequence[Observation]:
-    """Observations of one assembly, each as `lowered_observation` has it."""
-    alike = bool(observations) and lowered(observations[0].assembly) is observations[0].assembly
-    return observations if alike else [lowered_observation(one) for one in observations]
+def project_observations(observations: Sequence[Observation]) -> Sequence[Observation]:
+    """Observations of one assembly, each as `project_observation` has it."""
+    alike = bool(observations) and project_round_faces(observations[0].assembly) is observations[0].assembly
+    return observations if alike else [project_observation(one) for one in observations]
 
 
 @remembered

@@ -109,6 +109,6 @@ def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
     assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)
 
 
-def test_what_is_no_look_is_refused():
-    with pytest.raises(InputError, match="look of correct must be a Look or None"):
+def test_anything_but_a_reobserver_is_refused():
+    with pytest.raises(InputError, match="reobserve of correct must be a Reobserver or None"):
         correct(look("block_on_block", 1), "contact-robust", 2)

@@ -32,7 +32,7 @@ UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
-class RobotBelief:
+class RobotEstimate:
     """Mean and covariance of all unknowns of `robot_model`, after all touches so far."""
 
     middle: Array
@@ -45,7 +45,7 @@ class RobotBelief:
     mean: Array
     """(u,), [m, rad]."""
     covariance: Array
-    """(u, u), to first order: with `UNSTATED` regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
+    """(u, u), to first order: with `UNKNOWN` regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
     5 um, where what the robot's errors make to second order is no longer small (`benchmarks/touches.py`)."""
     felt: tuple[NumberedTouch, ...] = ()
     """All touches so far, with the grasps that they are of."""
@@ -107,7 +107,7 @@ class RobotBelief:
         """Root mean square of what `felt_deg` is off, as a vector, [deg]."""
         return float(np.degrees(np.sqrt(np.trace(self.covariance[HAND_EYE, HAND_EYE][3:, 3:]))))
 
-    def grasp(self, number: int, sigmas: ArrayLike) -> "RobotBelief":
+    def grasp(self, number: int, sigmas: ArrayLike) -> "RobotEstimate":
         """A part was grasped; a grasp of the same number is over, but what was felt with it is kept.
 
         Args:
@@ -127,7 +127,7 @@ class RobotBelief:
             covariance=covariance,
         )
 
-    def touch(self, *touches: Touch) -> "RobotBelief":
+    def touch(self, *touches: Touch) -> "RobotEstimate":
         """What is believed after further touches, from all of them and the priors.
 
         Raises:
@@ -204,17 +204,17 @@ class RobotBelief:
         return np.zeros((6, self.joints)) if jacobian is None else checked_array("Jacobian", jacobian, 6, self.joints)
 
 
-def believe(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotBelief:
+def prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
     """What is believed before the first touch: a robot that is right, as surely as is stated.
 
     Args:
-        sigmas: Standard deviations, [mm] and [deg]; `UNSTATED` where nobody states them.
+        sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where nobody states them.
         joints: How many joints the arm has.
         middle: (3,), [m], world frame: the mean of the goals.
     """
     require(
         isinstance(sigmas, Sigmas),
-        f"{kind(sigmas)} was given as sigmas; give UNSTATED, or apo_bench.records.robot_sigmas('hand_eye:1/0.2').",
+        f"{kind(sigmas)} was given as sigmas; give UNKNOWN, or apo_bench.records.robot_sigmas('hand_eye:1/0.2').",
     )
     whole = isinstance(joints, int | np.integer) and joints >= 0
     require(whole, f"{joints} joints were given; give the number of joints of the arm.")
@@ -224,7 +224,7 @@ def believe(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotBelief:
     prior[TOOL] = 1e-3 * sigmas.tool_mm
     prior[joints_in(joints)] = np.radians(sigmas.joints_deg)
     checked = _checked_sigmas(prior, len(prior))
-    return RobotBelief(
+    return RobotEstimate(
         checked_array("middle", middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2)
     )
 
