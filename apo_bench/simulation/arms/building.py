@@ -12,12 +12,13 @@ from msgspec import structs
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
+from apo_bench.io import named_files
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
 from apo_bench.simulation.arms.grooves import fill_grooves
 from apo_bench.simulation.arms.home import with_home
-from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
+from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
@@ -72,7 +73,6 @@ def build_arm(description: ArmDescription) -> Arm:
     mjcf = description.model_file
     spec = load_model(mjcf, "arm")
     model = compiled(spec, mjcf)
-    check_surroundings(model, mjcf)
     flange, T_flange = find_flange(model, description)
     joints = find_joints(model, flange, description)
     last = model.body(flange).name
@@ -242,8 +242,8 @@ def _text(spec: Any, measured: Measured) -> str:
 
 
 def _files(description: ArmDescription) -> tuple[Path, ...]:
-    gripper = () if description.gripper_file is None else files_of(description.gripper_file)
-    return tuple(dict.fromkeys((description.file, *files_of(description.model_file), *gripper)))
+    gripper = () if description.gripper_file is None else named_files(description.gripper_file)
+    return tuple(dict.fromkeys((description.file, *named_files(description.model_file), *gripper)))
 
 
 def _usual_home(model: Any, joints: Sequence[str]) -> Array:
