@@ -18,8 +18,8 @@ import gymnasium
 import apo_bench
 from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import scenario_names
+from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "environment.csv"

@@ -27,8 +27,8 @@ from apo_bench.scenario.parts.making import (
     turned,
     write_part,
 )
+from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of
-from apo_bench.trial.trial import run_trial
 
 DENSITY = 700.0
 

@@ -101,7 +101,7 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
     from apo_bench.records import TrialConfig
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import build_scene
-    from apo_bench.trial.trial import run_trial
+    from apo_bench.trial.run import run_trial
 
     scenes: dict[str, Any] = {}
     building: dict[str, float] = {}
