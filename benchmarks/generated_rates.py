@@ -29,8 +29,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of
 from benchmarks.rates_by_condition import counted
 

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from apo_bench.benchmark.analysis import read_timing, tally
 from apo_bench.benchmark.analysis.paired import paired
 from apo_bench.benchmark.report.report import report
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from benchmarks.headline_figure import draw_summary
 from benchmarks.headline_page import describe_fidelity, page
 from benchmarks.headline_summary import block, summarise
@@ -71,14 +71,14 @@ def copy_first_seeds(folder: Path, copy: Path, trials: int | None) -> None:
         grid["trials"] = trials or grid["trials"]
     end = run["grids"][0]["seed"] + run["grids"][0]["trials"]
     (copy / "run.json").write_text(json.dumps(run), encoding="utf-8")
-    for name, lines in (("trials.jsonl", read_rows(folder)), ("timing.jsonl", read_timing(folder))):
+    for name, lines in (("trials.jsonl", read_records(folder)), ("timing.jsonl", read_timing(folder))):
         kept = (json.dumps(line) for line in lines if line["seed"] < end)
         (copy / name).write_text("".join(f"{line}\n" for line in kept), encoding="utf-8")
 
 
 def keep(folder: Path) -> None:
     """Keep trials, table and what ran."""
-    rows = read_rows(folder)
+    rows = read_records(folder)
     KEPT.mkdir(parents=True, exist_ok=True)
     shutil.copy(report(folder).tables["cells"], KEPT / "table.csv")
     (KEPT / "run.json").write_text(json.dumps(describe_run(folder, rows), indent=2) + "\n", encoding="utf-8")
@@ -119,7 +119,7 @@ def describe_run(folder: Path, rows: Sequence[TrialRecord]) -> dict[str, Any]:
     trials = run["grids"][0]["trials"]
     return {
         "command": f"make headline TRIALS={trials} FIDELITY={run['grids'][0]['fidelity']}",
-        **{key: run[key] for key in ("schema", "grids", "versions", "python", "platform", "content", "code")},
+        **{key: run[key] for key in ("schema", "grids", "versions", "python", "platform", "content")},
         "rows": len(rows),
         "replays": sum(row["sim_time_s"] is not None for row in rows),
         "simulated_hours": round(sum(row["sim_time_s"] or 0.0 for row in rows) / 3600, 1),

@@ -15,6 +15,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import explanations, plan_score
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
@@ -24,7 +25,6 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     trial_outcome,
 )
-from apo_bench.trial.trial import noise_of, run_trial
 from benchmarks.block_assemblies import scenario_of_blocks
 from benchmarks.generated import scenario_of
 
