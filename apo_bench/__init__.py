@@ -22,7 +22,7 @@ __version__ = "0.1.0"
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay", max_episode_steps=1)
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
 gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert", max_episode_steps=200)
-gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=1000)
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=10_000)
 
 _EXPORTS = MappingProxyType(
     {
@@ -39,6 +39,7 @@ _EXPORTS = MappingProxyType(
         "Layout": "apo_bench.assembly.demonstration",
         "Observation": "apo_bench.assembly.observation",
         "Plan": "apo_bench.assembly.plan",
+        "RateTable": "apo_bench.benchmark.rate_table",
         "ReplayResult": "apo_bench.assembly.reached",
         "Scenario": "apo_bench.scenario.scenario",
         "Scene": "apo_bench.simulation.scene.scene",
@@ -51,6 +52,7 @@ _EXPORTS = MappingProxyType(
         "correct_many": "apo_bench.correction.batches",
         "demonstrate": "apo_bench.simulation.human.demonstration",
         "detect_contacts": "apo_bench.perception.detection.contacts",
+        "evaluate": "apo_bench.benchmark.evaluation",
         "draw_layout": "apo_bench.scenario.layout",
         "explain": "apo_bench.correction.explanation",
         "fitting_plan": "apo_bench.trial.fitting",
@@ -62,7 +64,7 @@ _EXPORTS = MappingProxyType(
         "read_observation": "apo_bench.formats.observation",
         "replay": "apo_bench.simulation.execution.controller",
         "run_sweep": "apo_bench.benchmark.sweeps.sweep",
-        "run_trial": "apo_bench.trial.trial",
+        "run_trial": "apo_bench.trial.run",
     }
 )
 """Name -> the module that it is imported from when it is first asked for."""

@@ -7,6 +7,8 @@ from apo_bench.assembly.observation import Observation as Observation
 from apo_bench.assembly.plan import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.evaluation import evaluate as evaluate
+from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.batches import correct_many as correct_many
@@ -36,6 +38,6 @@ from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
 from apo_bench.trial.fitting import fitting_plan as fitting_plan
-from apo_bench.trial.trial import run_trial as run_trial
+from apo_bench.trial.run import run_trial as run_trial
 
 __version__: str

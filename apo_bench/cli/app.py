@@ -63,7 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # what the command line library makes of a pipe that nobody reads
         if not isinstance(error.__context__, OSError):
             raise
-        return _complain(streams.unexpected(error.__context__), NO_RESULT)
+        streams.give_up_output()
+        return 0
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise

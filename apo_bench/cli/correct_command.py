@@ -35,7 +35,7 @@ def correct_command(
     deviation_deg: DeviationDeg = 1.0,
     camera_noise: Annotated[
         Path | None,
-        typer.Option(help="Take the noise of this file, of `noise learn` or `noise fit`, for what the camera states."),
+        typer.Option(help="Take the noise of this file, as `noise fit` writes it, for what the camera states."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -55,10 +55,10 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
-        from apo_bench.perception.observation.models.fitted import restated
+        from apo_bench.perception.observation.models.fitted import restate
         from apo_bench.perception.observation.noise_file import read_noise
 
-        seen = restated(seen, *read_noise(camera_noise))
+        seen = restate(seen, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
         correction = correct(seen, corrector)

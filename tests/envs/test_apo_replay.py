@@ -456,7 +456,7 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
     true = robot.replay_and_judge
 
     def replay_and_judge(*args: Any, **more: Any) -> Any:
-        asked.append(args[4])
+        asked.append(args[4].fidelity)
         return true(*args, **more)
 
     monkeypatch.setattr(REPLAY, replay_and_judge)
