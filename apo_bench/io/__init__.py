@@ -1,7 +1,6 @@
 """Read and write files within limits, and start processes; knows nothing of assemblies."""
 
-from apo_bench.io.csv_reading import Columns, CsvRow, check_separator, read_csv
-from apo_bench.io.csv_writing import write_csv
+from apo_bench.io.csv_tables import Columns, CsvRow, read_csv, write_csv
 from apo_bench.io.documents import (
     Finite,
     NotNegative,
@@ -44,7 +43,6 @@ __all__ = (
     "Triple",
     "brief",
     "check_quaternion",
-    "check_separator",
     "check_target",
     "clean",
     "columns",

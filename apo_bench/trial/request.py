@@ -233,7 +233,8 @@ def _drawn(
     request: Request, spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, watch: Any
 ) -> TrialRecord:
     if request.save_observation:
-        from apo_bench.formats.json_forms import observation_form, write_form
+        from apo_bench.formats.json_forms import write_form
+        from apo_bench.formats.observation_json import observation_form
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)

@@ -130,7 +130,10 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
     probing = probing_config(plan(name), scene(name), "in_hand:0.5/1", (6,))
     felt = replay_and_judge(
-        plan(name), scene(name), plan(name).target_poses, config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+        plan(name),
+        scene(name),
+        plan(name).target_poses,
+        config=ExecutionConfig("near-contact", robot_error=error, probing=probing),
     )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
