@@ -30,15 +30,15 @@ def detect_contacts_command(
     **options: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
-    from apo_bench.trial.detected_contacts import recognise_by
-    from apo_bench.trial.request import looked_at
+    from apo_bench.trial.detected_contacts import detect_by
+    from apo_bench.trial.request import load_or_draw_observation
     from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
 
     require_known("way of recognising", contact_source, DETECTED)
     name = load_scenario(scenario).name
     with redirect_output(as_json):
-        seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
-    form = recognition_form(name, contact_source, seen, recognise_by(seen, contact_source), assumed)
+        seen, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
+    form = recognition_form(name, contact_source, seen, detect_by(seen, contact_source), assumed)
     if as_json:
         print_json(form)
         return

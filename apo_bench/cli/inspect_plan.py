@@ -86,7 +86,7 @@ def plan_command(
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
     if arm is not None:
-        from apo_bench.trial.planning import arm_sentence
+        from apo_bench.trial.plan_warnings import arm_sentence
 
         notes.append(arm_sentence(loaded, None if observation is None else plan, arm))
         if frames is None:
@@ -128,7 +128,8 @@ def _planned(
     scenario: str, observation: Path, method: str, deviations: tuple[float | None, float | None]
 ) -> tuple[Scenario, Plan, float, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, what it promises, and what is to be said."""
-    from apo_bench.trial.planning import apply_method, plan_warning
+    from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.trial.planning import apply_method
     from apo_bench.trial.predicted_success import predict_success
 
     seen, loaded, assumed = read_observation_file(

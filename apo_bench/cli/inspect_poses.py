@@ -32,7 +32,7 @@ def poses_command(
     **options: Any,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
-    from apo_bench.trial.request import looked_at
+    from apo_bench.trial.request import load_or_draw_observation
     from apo_bench.viz.believed_picture import belief_lines, belief_panel, draw_beliefs
 
     check_writable(out, "--out", (".png",))
@@ -40,7 +40,7 @@ def poses_command(
     last = len(loaded.assembly)
     k = last if step is None else step
     require(1 <= k <= last, f"step {step} was given; the scenario has operations 1 to {last}.")
-    observed, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
+    observed, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
     _check_seen(observed, k)
     panels = []
     if seen or not corrected:
@@ -59,7 +59,7 @@ def _correct(scenario: Scenario, observed: Observation, method: str) -> tuple[Ar
     """The goals that are planned, (n, 4, 4), and what speaks against them."""
     from apo_bench.correction.correctors import correct
     from apo_bench.trial.fitting import fitting_plan
-    from apo_bench.trial.planning import plan_warning
+    from apo_bench.trial.plan_warnings import plan_warning
 
     correction = correct(observed, with_simulated(method))
     if not correction.ok:

@@ -87,11 +87,7 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
 
 def _check_header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> None:
     """Check that every column is known, that none stands for the same as another one, and that none is missing."""
-    for separator, called in _SEPARATORS.items():
-        require(
-            len(names) != 1 or separator not in names[0],
-            f"{place}: columns are separated by commas; this file uses {called}, so save it with commas.",
-        )
+    check_separator(place, names)
     for name in names:
         require_known("column", name, columns, place=place)
     meanings = [columns[name][0] for name in names]
@@ -100,6 +96,15 @@ def _check_header(place: str, names: Sequence[str], columns: Columns, required: 
     for wanted, (meaning, _) in columns.items():
         present = meaning in meanings or meaning not in required
         require(present, f"{place}: the column '{wanted}' is missing.")
+
+
+def check_separator(place: str, names: Sequence[str]) -> None:
+    """Refuse names of columns that are separated otherwise than by commas."""
+    for separator, called in _SEPARATORS.items():
+        require(
+            len(names) != 1 or separator not in names[0],
+            f"{place}: columns are separated by commas; this file uses {called}, so save it with commas.",
+        )
 
 
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

@@ -18,8 +18,8 @@ from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fi
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
+from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
-from apo_bench.trial.trial import probing_config
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 

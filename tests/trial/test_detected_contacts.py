@@ -43,7 +43,7 @@ def row(contact_source: str, method: str = "contact", seed: int = 0, **changes: 
         "human_error_scale": 0.0,
     }
     counts = {"contacts_true_positive": 3, "contacts_false_negative": 0, "contacts_false_positive": 0}
-    noise_level = {"noise_level": 1.0, "noise_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
+    noise_level = {"noise_mm": 1.0, "noise_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
     return base | noise_level | counts | changes
 
 

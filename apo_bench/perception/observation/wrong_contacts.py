@@ -68,7 +68,7 @@ def make_contacts(given: Any) -> ContactSource | None:
         callable(source) and not isinstance(source, type),
         f"the source of contacts '{name}' is no function; give (assembly, start, poses, rng) -> Assembly.",
     )
-    return source  # type: ignore[no-any-return]
+    return source
 
 
 def with_contacts(

@@ -96,11 +96,11 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
         return _of_boxes(path, model, pieces)
     require(not model.sites, f"{path}: sites name faces of boxes alone; state faces in {path.stem}.toml.")
     stated = read_stated_part(path.with_suffix(".toml"))
-    given = stated.friction
-    geoms = tuple(
-        replace(geom, density=stated.density, friction=(*given, *geom.friction[len(given) :])) for geom in model.geoms
-    )
-    return PartFile(path, pieces, (), stated, stated.density, replace(model, geoms=geoms))
+    geoms = []
+    for geom in model.geoms:
+        sliding, turning, rolling = (*stated.friction, *geom.friction[len(stated.friction) :])
+        geoms.append(replace(geom, density=stated.density, friction=(sliding, turning, rolling)))
+    return PartFile(path, pieces, (), stated, stated.density, replace(model, geoms=tuple(geoms)))
 
 
 def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFile:

@@ -48,7 +48,7 @@ def numbers(seed: int, method: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = write(tmp_path_factory.mktemp("page") / "run", rows())
-    keys = ("scenario", "method", "seed", "noise_level")
+    keys = ("scenario", "method", "seed", "noise_mm")
     lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
     text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
     (folder / "timing.jsonl").write_text(text, encoding="utf-8")
@@ -125,7 +125,7 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
         assert page.evaluate("navigator.clipboard.readText()") == want
         page.locator(".trials input").check()
-        failed = [r for r in rows() if (r["method"], r["noise_level"], r["success"]) == ("paper", 2.0, False)]
+        failed = [r for r in rows() if (r["method"], r["noise_mm"], r["success"]) == ("paper", 2.0, False)]
         assert lines.count() == len(failed)
         page.keyboard.press("Escape")
         assert button.get_attribute("aria-expanded") == "false"
@@ -294,7 +294,7 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))
-    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_level"] is not None for r in trials)
+    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_mm"] is not None for r in trials)
 
 
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
