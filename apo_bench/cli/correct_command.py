@@ -89,7 +89,7 @@ def correct_command(
 
 def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
-    from apo_bench.correction.checks.status import gap_of
+    from apo_bench.correction.checks.as_given import gap_of
     from apo_bench.correction.explanation import explain
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
