@@ -89,7 +89,7 @@ def correct_command(
 
 def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
-    from apo_bench.correction.checks.status import gap_of
+    from apo_bench.correction.checks.as_given import gap_of
     from apo_bench.correction.explanation import explain
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
@@ -118,7 +118,8 @@ def _corrector(method: str, doubt: str | None) -> Any:
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     from apo_bench.formats.csv_form import table
-    from apo_bench.formats.json_forms import plan_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.plan_json import plan_form
 
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)

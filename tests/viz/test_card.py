@@ -68,4 +68,6 @@ def test_the_page_is_what_the_scenarios_say() -> None:
     measured = {scenario.name: describe(scenario, read_counts()) for scenario in scenarios}
     written = cards(scenarios, "python docs/task_sheets.py", "../pictures/graph_{}.png", HEAD, measured)
     assert PAGE.read_text(encoding="utf-8") == written, "run: python docs/task_sheets.py"
-    assert describe_nominal(scenarios, read_counts()) in JUDGE.read_text(encoding="utf-8"), "run: python docs/task_sheets.py"
+    assert describe_nominal(scenarios, read_counts()) in JUDGE.read_text(encoding="utf-8"), (
+        "run: python docs/task_sheets.py"
+    )

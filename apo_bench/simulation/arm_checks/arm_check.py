@@ -9,13 +9,20 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise, trace
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution import key_angles, moves
-from apo_bench.simulation.robot import ExecutionAborted, Robot, shifted, smooth, steady, turn_from
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+    turn_from,
+)
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
@@ -27,7 +34,6 @@ _PUSH_S = 0.5
 """Stiffness is looked at by this push, which lasts so long."""
 _LAYOUTS = 20
 _LEAST_MARGIN_DEG = 5.0
-_LEVER_M = 0.1
 
 
 @final
@@ -82,7 +88,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     if across > scene.clearance_mm:
         missing.append(
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; "
-            f"{_softest(scene)}, or make the clearance larger."
+            "give its motors more 'armature' in the MJCF, so that its servos get stiffer, or make the clearance larger."
         )
     if force < LEAST_FORCE_N:
         missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
@@ -110,18 +116,6 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
         layouts_reached=len(in_reach),
         clearance_mm=scene.clearance_mm,
         missing=tuple(missing),
-    )
-
-
-def _softest(scene: Scene) -> str:
-    """Which joint gives way most, pushed at the tip or turned there by as much 0.1 m farther, and what would help."""
-    J = np.array(scene.kinematics.jacobian(scene.arm.home))
-    gains = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
-    J[3:] *= _LEVER_M
-    k = int(((J**2).sum(axis=0) / gains).argmax())
-    return (
-        f"the joint '{scene.arm.joints[k]}' gives way most ({gains[k]:.0f} Nm/rad): its servo gets stiffer with the "
-        "'armature' of its motor in the MJCF"
     )
 
 
@@ -160,19 +154,23 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
             rise(robot, 0.3)
             for i, speed in enumerate(SPEEDS):
                 way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-                end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
-                line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
-                errors.append(error_on(line, robot.trace(line), speed))
+                end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+                line = (
+                    smooth_trajectory(robot.T, end, speed)
+                    if speed == SPEEDS[-1]
+                    else steady_trajectory(robot.T, end, speed)
+                )
+                errors.append(error_on(line, trace(robot, line), speed))
                 robot.wait(STAND_S)
-            rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
-            before = _pushed(robot, np.zeros(3))
-            x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+            rest = float(np.linalg.norm(_push(robot, np.zeros(3)) - robot.T[:3, 3]))
+            before = _push(robot, np.zeros(3))
+            x, y, z = (1e3 * abs(float((_push(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
     except ExecutionAborted:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
 
 
-def _pushed(robot: Robot, force: Array) -> Array:
+def _push(robot: Robot, force: Array) -> Array:
     """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force

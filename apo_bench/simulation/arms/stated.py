@@ -7,9 +7,9 @@ import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, pose
+from apo_bench.io import named_files
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.description import ArmDescription
-from apo_bench.simulation.arms.loading import files_of
 
 
 def speed_limits(description: ArmDescription, joints: int) -> Array | None:
@@ -27,7 +27,7 @@ def stated_arm(description: ArmDescription, model: Any, joints: list[str], flang
         flange: The body at the end of the arm.
 
     Raises:
-        InputError: Its model has not what the file names, or something is not stated that nothing else tells.
+        InputError: Its model lacks what the file names, or a key is missing.
     """
     file = description.file
     gripper = description.gripper
@@ -64,5 +64,5 @@ def stated_arm(description: ArmDescription, model: Any, joints: list[str], flang
             speed_rad_s=speed_limits(description, len(joints)),
             fingers_m_s=ArmLimits.fingers_m_s if gripper.speed_mm_s is None else 1e-3 * gripper.speed_mm_s,
         ),
-        files=tuple(dict.fromkeys((file, *files_of(description.model_file)))),
+        files=tuple(dict.fromkeys((file, *named_files(description.model_file)))),
     )
