@@ -76,7 +76,7 @@ def test_a_function_without_a_module_stays_in_this_process() -> None:
     ("wrong", "said"),
     [
         ({"scenario": "no_such"}, "no_such"),
-        ({"noise_level": -1}, "noise level of -1"),
+        ({"noise_level": -1}, "noise level must be a number from 0 to 50, got -1"),
         ({"noise_lvl": 1}, "noise_lvl"),
         ({"seeds": 0}, "0 trials were given"),
     ],
