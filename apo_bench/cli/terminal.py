@@ -63,7 +63,7 @@ def print_report(report: Report) -> None:
         lines.append(f"{drawn} drawn. Not drawn: {'; '.join(report.no_pictures)}.")
     lines.append(f"Answer:  {report.answer.replace('`', '')}")
     same = "the same as .parquet" if has_parquet() else "as .parquet too with the package pyarrow"
-    lines.append(f"Tables:  {report.tables['cells']} and {len(report.tables) - 1} more there, {same}")
+    lines.append(f"Tables:  {report.tables['conditions']} and {len(report.tables) - 1} more there, {same}")
     if report.figures:
         lines.append(f"Figures: {report.figures[0]} and {len(report.figures) - 1} more there")
     lines.append(f"Report:  {report.page}")
