@@ -118,7 +118,8 @@ def _corrector(method: str, doubt: str | None) -> Any:
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     from apo_bench.formats.csv_form import table
-    from apo_bench.formats.json_forms import plan_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.plan_json import plan_form
 
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)

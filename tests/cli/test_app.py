@@ -88,7 +88,8 @@ def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFix
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
     from apo_bench import Observation
-    from apo_bench.formats.json_forms import observation_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.observation_json import observation_form
     from apo_bench.geometry import pose
 
     scenario = load_scenario("stick_in_tower")

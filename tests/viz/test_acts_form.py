@@ -84,7 +84,9 @@ def test_only_what_has_walls_to_fit_into_is_touched_from_the_side() -> None:
 @pytest.mark.parametrize(("name", "frames"), [("stick_in_tower", "tip"), ("peg_in_hole", "flange")])
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
-    for one, (step, t) in zip(form(name, frames)["steps"], moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True):
+    for one, (step, t) in zip(
+        form(name, frames)["steps"], moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
+    ):
         assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
         for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):
             assert np.allclose(tip(said["at"], frames), t.T_world_start @ grip.T_part_tip, atol=1e-9)
