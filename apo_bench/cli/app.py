@@ -16,7 +16,7 @@ from apo_bench import __version__
 from apo_bench.cli import noise, part, recording, scenario, score, sweep
 from apo_bench.cli.arguments import NO_RESULT
 from apo_bench.cli.correct_command import correct_command
-from apo_bench.cli.detect_contacts import detect_contacts_command
+from apo_bench.cli.detect_command import detect_contacts_command
 from apo_bench.cli.help import Grouped, GroupedOptions, group
 from apo_bench.cli.inspect_depth import depth_command
 from apo_bench.cli.inspect_dof import dof_command

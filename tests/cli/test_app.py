@@ -230,7 +230,7 @@ def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixtu
     assert [row["seed"] for row in read_records(out_folder)] == [3, 4]
     code, out, err = run(capsys, "report", str(out_folder))
     assert (code, err) == (0, "")
-    for name in ("tables/cells.csv", "figures/success_over_level.svg", "report.html"):
+    for name in ("tables/cells.csv", "figures/success_over_noise_level.svg", "report.html"):
         assert str(out_folder / name) in out
         assert (out_folder / name).stat().st_size > 0
 
