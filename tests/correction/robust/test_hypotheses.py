@@ -6,7 +6,6 @@ from math import comb
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.correction.robust.test_looks import Again, at_the_same_place
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, placements
