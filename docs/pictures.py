@@ -1,5 +1,4 @@
-"""Draw the picture at the top, what is believed, and two pictures of films: `python docs/pictures.py` (half a minute,
-no display needed)."""
+"""Draw the picture at the top, pose estimates and two pictures of films: `python docs/pictures.py` (half a minute)."""
 
 from __future__ import annotations
 
@@ -40,7 +39,7 @@ def main() -> None:
     ]
     draw_top(shots, HERE / "top.png")
     beliefs = [belief_panel("as seen", seen, seen.poses, 3), belief_panel("corrected by contact", seen, corrected, 3)]
-    draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
+    draw_beliefs(scene.scenario, 3, beliefs, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")
 

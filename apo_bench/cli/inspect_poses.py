@@ -21,7 +21,7 @@ from apo_bench.scenario.scenario import Scenario
 def poses_command(
     scenario: ScenarioArgument,
     *,
-    out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
+    out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("estimates.png"),
     seen: Annotated[bool, typer.Option("--seen", help="Only what was seen.")] = False,
     corrected: Annotated[bool, typer.Option("--corrected", help="Only what the method makes of it.")] = False,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,

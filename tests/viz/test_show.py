@@ -77,7 +77,7 @@ def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.Ca
     said = capsys.readouterr()
     assert part in said.err
     assert said.err.count("\n") == 1
-    assert not Path("believed.png").exists()
+    assert not Path("estimates.png").exists()
 
 
 def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
