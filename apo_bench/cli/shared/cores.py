@@ -1,4 +1,4 @@
-"""How many processes the machine gives this one."""
+"""The number of processor cores that this process may use."""
 
 import os
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 _MOST = 64
 
 
-def cores() -> int:
-    """The cores that this process may use, at most 64."""
+def count_cores() -> int:
+    """Cores that this process may use, at most 64."""
     affinity: Any = getattr(os, "sched_getaffinity", None)
     return max(1, min(_MOST, len(affinity(0)) if affinity else os.cpu_count() or 1))

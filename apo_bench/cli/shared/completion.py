@@ -1,6 +1,6 @@
-"""What a shell is offered when Tab is pressed: names out of short lists and folders, without anything being read.
+"""Names that a shell offers when Tab is pressed, from short lists and folders; no file is read.
 
-Where none begins like what was typed, a shell offers files, as scenarios, noises and arms may be.
+Where no name begins like the typed text, a shell offers files, as scenarios, noise models and arms may be files.
 """
 
 from collections.abc import Callable
@@ -9,30 +9,30 @@ from apo_bench.records import DETECTED, FOREIGN_ARMS, METHODS, SETTINGS, WRONG_C
 from apo_bench.resources import folder
 
 Completion = Callable[[str], list[str]]
-"""What was typed of a word -> the words that it may become."""
+"""The typed part of a word -> the words that it may become."""
 
 
-def offered_names(what: str) -> list[str]:
-    """Names that a shell is offered for a setting, or `scenario`: what comes with the package, and how others begin."""
-    if what == "scenario":
+def offered_names(setting: str) -> list[str]:
+    """Names that come with the package for a setting or a `scenario`, and prefixes of others."""
+    if setting == "scenario":
         return _stems("scenarios", "*.toml")
-    if what == "noise":
+    if setting == "noise":
         from apo_bench.perception.observation.noise import NOISES
 
         return [*NOISES, *_stems("assets", "noise/*.toml")]
-    if what == "arm":
+    if setting == "arm":
         return [SETTINGS["arm"].default, *_stems("assets", "arms/*.toml"), *FOREIGN_ARMS]
-    if what == "contact_source":
+    if setting == "contact_source":
         return [SETTINGS["contact_source"].default, *DETECTED, *WRONG_CONTACTS]
-    return [*METHODS, "spiral-search"] if what == "method" else [*SETTINGS[what].choices]
+    return [*METHODS, "spiral-search"] if setting == "method" else [*SETTINGS[setting].choices]
 
 
-def completion(what: str) -> Completion:
-    """Names that begin like what was typed, after its last comma."""
+def completion(setting: str) -> Completion:
+    """Offer names that begin like the text after the last comma."""
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")
-        names = [name for name in offered_names(what) if name.startswith(last) and name not in before.split(",")]
+        names = [name for name in offered_names(setting) if name.startswith(last) and name not in before.split(",")]
         return [f"{before}{comma}{name}" for name in names]
 
     return complete

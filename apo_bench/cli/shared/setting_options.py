@@ -1,4 +1,4 @@
-"""Options of the command line for the settings of a trial, made from what is stated with each."""
+"""Options for the settings of a trial, made from the description of each setting."""
 
 from collections.abc import Callable, Iterable
 from inspect import Parameter, signature
@@ -7,8 +7,9 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from apo_bench.cli.completion import completion
-from apo_bench.cli.values import numbers, path_given, whole_numbers, words
+from apo_bench.cli.shared.arguments import path_option
+from apo_bench.cli.shared.completion import completion
+from apo_bench.cli.shared.values import parse_list
 from apo_bench.records import NOISE_LEVEL, SETTINGS, SettingInfo
 from apo_bench.records.run.replay_command import milli, number
 
@@ -29,24 +30,25 @@ def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
 
 
 def trial_options(*names: str) -> list[Parameter]:
-    """Options of one trial, none of which need be given: those of these settings, or of all."""
+    """Options of one trial for these settings, or for all; each may be left out."""
     infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
-    return [_of_trial(info) for name, info in infos.items() if info.help and (not names or name in names)]
+    return [_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
 
 
 def sweep_options() -> list[Parameter]:
-    """Options of a sweep: its axes, and what all of its trials have in common."""
+    """Options of a sweep: its axes, and the settings that all of its trials share."""
     axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
+    shared = [info for info in SETTINGS.values() if info.shared]
     return [
-        *map(_axis, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
-        *map(_of_trial, [info for info in SETTINGS.values() if info.shared]),
+        *map(_axis_option, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
+        *map(_trial_option, shared),
     ]
 
 
 def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
-    """What was given for an axis: `0,0.5,1` or `none,contact`."""
-    read = words if info.is_text else whole_numbers if info.is_whole else numbers
-    return read(text, f"--{info.option}")
+    """The values of an axis: `0,0.5,1` or `uncorrected,contact`."""
+    kind = str if info.is_text else int if info.is_whole else float
+    return parse_list(text, f"--{info.option}", kind)
 
 
 def shown_default(info: SettingInfo) -> str:
@@ -54,29 +56,26 @@ def shown_default(info: SettingInfo) -> str:
     return info.usual or _in_option_unit(info, info.default)
 
 
-def _of_trial(info: SettingInfo) -> Parameter:
-    described = f"{info.help}; default: {shown_default(info)}."
+def _trial_option(info: SettingInfo) -> Parameter:
+    description = f"{info.help}; default: {shown_default(info)}."
     if info.name == "secret_seed":
-        return _option(info.keyword, Path, described, parser=path_given, metavar="<path>")
-    kind = getattr(info.kind, "__origin__", info.kind)
-    return _option(info.keyword, kind, described, autocompletion=_completion_of(info))
+        return _parameter(info, Path, path_option(description))
+    return _parameter(info, getattr(info.kind, "__origin__", info.kind), _option(info, description))
 
 
-def _axis(info: SettingInfo) -> Parameter:
+def _axis_option(info: SettingInfo) -> Parameter:
     usual = ",".join(_in_option_unit(info, value) for value in info.swept) or shown_default(info)
-    described = f"{info.help}; several with commas; default: {usual}."
-    return _option(info.keyword, str, described, autocompletion=_completion_of(info))
+    return _parameter(info, str, _option(info, f"{info.help}; several with commas; default: {usual}."))
 
 
-def _completion_of(info: SettingInfo) -> Callable[[str], list[str]] | None:
-    """How the value of a setting is completed; None where it is a number."""
+def _option(info: SettingInfo, description: str) -> Any:
     named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
-    return completion(info.name) if named else None
+    return typer.Option(help=description, autocompletion=completion(info.name) if named else None)
 
 
-def _option(name: str, kind: Any, described: str, **more: Any) -> Parameter:
-    annotation = Annotated[kind | None, typer.Option(help=described, **more)]
-    return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+def _parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:
+    annotation = Annotated[kind | None, option]
+    return Parameter(info.keyword, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
 def _in_option_unit(info: SettingInfo, value: Any) -> str:
