@@ -19,10 +19,10 @@ import gymnasium
 
 __version__ = "0.1.0"
 
-gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
+gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay", max_episode_steps=1)
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
-gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert")
-gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble")
+gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert", max_episode_steps=200)
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=1000)
 
 _EXPORTS = MappingProxyType(
     {
@@ -33,6 +33,7 @@ _EXPORTS = MappingProxyType(
         "Correction": "apo_bench.assembly.correction_record",
         "Criteria": "apo_bench.records.thresholds",
         "Demonstration": "apo_bench.assembly.goals",
+        "Flatten": "apo_bench.envs.flatten",
         "Film": "apo_bench.simulation.scene.render",
         "InputError": "apo_bench.errors",
         "Layout": "apo_bench.assembly.goals",
@@ -49,6 +50,7 @@ _EXPORTS = MappingProxyType(
         "correct": "apo_bench.correction.correctors",
         "correct_many": "apo_bench.correction.correctors",
         "demonstrate": "apo_bench.simulation.human.demonstration",
+        "detect_contacts": "apo_bench.perception.detection.contacts",
         "draw_layout": "apo_bench.scenario.layout",
         "explain": "apo_bench.correction.explanation",
         "fitting_plan": "apo_bench.trial.fitting",
@@ -58,7 +60,6 @@ _EXPORTS = MappingProxyType(
         "picture": "apo_bench.simulation.scene.render",
         "read_arm": "apo_bench.simulation.arms.building",
         "read_observation": "apo_bench.formats.observation",
-        "recognise": "apo_bench.perception.detection.contacts",
         "replay": "apo_bench.simulation.execution.controller",
         "run_sweep": "apo_bench.benchmark.sweeps.sweep",
         "run_trial": "apo_bench.trial.trial",

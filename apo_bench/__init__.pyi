@@ -14,11 +14,12 @@ from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
+from apo_bench.envs.flatten import Flatten as Flatten
 from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.perception.detection.contacts import recognise as recognise
+from apo_bench.perception.detection.contacts import detect_contacts as detect_contacts
 from apo_bench.perception.observation.observing import observe as observe
 from apo_bench.records.settings import TrialConfig as TrialConfig
 from apo_bench.records.thresholds import Criteria as Criteria

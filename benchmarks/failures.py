@@ -29,11 +29,11 @@ from apo_bench.assembly import Plan, measured_rates, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import face_overlap
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models import Camera
 from apo_bench.perception.observation.models.failures import PRESETS, RATE, CameraFailures, Failure, draw_failing
 from apo_bench.perception.observation.noise import NoiseLevel
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.outcome_columns import goal_errors
@@ -129,7 +129,7 @@ def corrected(draw: Draw) -> dict[str, object]:
     scenario = load_scenario(draw.scene)
     shown, noise, seen, false = drawn(draw)
     first = np.random.default_rng([draw.seed, 30, 1])
-    max_reobservations = Looks(shown, noise, np.random.default_rng([draw.seed, 30, 2]), REOBSERVE, first=first)
+    max_reobservations = Reobservations(shown, noise, np.random.default_rng([draw.seed, 30, 2]), REOBSERVE, first=first)
     ends = dict[str, bool]()
     seconds = dict[str, float]()
     sentence = ""

@@ -19,7 +19,6 @@ from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
 from apo_bench.io.grouping import grouped
 from apo_bench.io.named_files import named_files
 from apo_bench.io.nodes import JsonNode, parse_json, read_json, read_toml
-from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
 from apo_bench.io.parquet import has_parquet, write_columns
 from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.io.result_files import (
@@ -31,6 +30,7 @@ from apo_bench.io.result_files import (
     replace_file,
     write_file,
 )
+from apo_bench.io.safe_io import decoded, each_line, opened, read_bytes, read_text
 from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
 from apo_bench.io.streams import redirect_output
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole

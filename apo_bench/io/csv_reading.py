@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn, final
 
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.io.safe_io import read_text
 
 Columns = Mapping[str, tuple[str, float]]
 """Name of a column -> what it stands for, and the size of its unit."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import LARGEST_BYTES, read_text
+from apo_bench.io.safe_io import LARGEST_BYTES, read_text
 from apo_bench.io.safe_text import UNSHOWN
 from apo_bench.io.whole_json import unique_members
 

@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io.documents import parse_plain, read_plain, show_value
-from apo_bench.io.ordinary_files import LARGEST_BYTES
+from apo_bench.io.safe_io import LARGEST_BYTES
 from apo_bench.io.safe_text import UNSHOWN
 
 

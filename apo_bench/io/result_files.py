@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import kind_of
+from apo_bench.io.safe_io import kind_of
 
 _PRIVATE = 0o600  # only the owner can read it
 _USUAL = 0o666  # less what the umask of the user takes away

@@ -9,14 +9,14 @@ The truth, the robot and the judge keep the contacts of the scenario.
 from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.perception.detection.contacts import recognise
-from apo_bench.perception.detection.evidence import Recognised
-from apo_bench.perception.detection.jointly import recognise_jointly
+from apo_bench.perception.detection.contacts import detect_contacts
+from apo_bench.perception.detection.evidence import DetectedContacts
+from apo_bench.perception.detection.jointly import detect_contacts_jointly
 
 
-def recognise_by(observation: Observation, kind: str = "detected") -> Recognised:
+def recognise_by(observation: Observation, kind: str = "detected") -> DetectedContacts:
     """Find the contacts of an observation in one of the ways of `RECOGNISED`, without those that came with it."""
-    return recognise_jointly(observation) if kind == "detected-jointly" else recognise(observation)
+    return detect_contacts_jointly(observation) if kind == "detected-jointly" else detect_contacts(observation)
 
 
 def with_recognised_contacts(observation: Observation, kind: str) -> Observation:

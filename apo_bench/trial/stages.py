@@ -15,9 +15,9 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.planning.prediction.failure import ARM_CODES, predict
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -145,14 +145,16 @@ def reobservations_of(
     allowed: int,
     secret_seed: SecretSeed | None = None,
     assembly: Assembly | None = None,
-) -> Looks:
+) -> Reobservations:
     """Looks at the demonstration of a trial that was observed once.
 
     Args:
-        assembly: As in `Looks`.
+        assembly: As in `Reobservations`.
     """
     first = stream(seed, OBSERVATION, secret_seed)
-    return Looks(simulated.demonstration, noise, stream(seed, REOBSERVE, secret_seed), allowed, assembly, first)
+    return Reobservations(
+        simulated.demonstration, noise, stream(seed, REOBSERVE, secret_seed), allowed, assembly, first
+    )
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:

@@ -13,8 +13,8 @@ from apo_bench.correction.calibration import UNKNOWN, believe, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -213,7 +213,7 @@ def _row(
     method: Any,
     watch: Any,
     cache: ReplayCache | None,
-    look: Looks | None,
+    look: Reobservations | None,
 ) -> TrialRecord:
     """What the method made of the observation, and what came of its plan.
 

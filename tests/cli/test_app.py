@@ -130,8 +130,8 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
 
     from apo_bench import Corrected, SweepConfig, TrialConfig, correct
     from apo_bench.cli.correct_command import correct_command
-    from apo_bench.cli.setting_options import trial_options
     from apo_bench.cli.inspect_poses import poses_command
+    from apo_bench.cli.setting_options import trial_options
     from apo_bench.records import CORRECTOR
 
     asked = signature(correct_command, eval_str=True).parameters["method"]

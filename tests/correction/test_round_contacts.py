@@ -152,7 +152,7 @@ def test_a_missing_view_is_inferred_from_a_round_contact():
     """The taper says where the pin is, all but its turn; the shaft leaves where along its hole, and which end is up."""
     for kind, free in (("shaft in hole", [2, 5]), ("cone in cone", [5]), ("shaft on plane", [1, 2, 3, 5])):
         observation, truth = case(kind, mm=0.1, deg=0.1)
-        made = correct(replace(observation, seen=np.array([True, False])), "contact-robust")
+        made = correct(replace(observation, observed=np.array([True, False])), "contact-robust")
         assert made.ok, made.sentence
         assert made.left_out == (1,)
         assert made.believed.assembly is observation.assembly
@@ -322,7 +322,7 @@ def test_errors_that_operations_share_are_used():
     goals = off @ truth
     Ad = pose.adjoint(pose.inverse(goals))
     both = replace(
-        observation, goals=goals, shared=(shared,), covariance=Ad @ C @ np.swapaxes(Ad, 1, 2) + np.eye(6) * 1e-10
+        observation, poses=goals, shared=(shared,), covariance=Ad @ C @ np.swapaxes(Ad, 1, 2) + np.eye(6) * 1e-10
     )
     made = correct(both)
     assert made.ok, made.sentence

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import TrialConfig
-from apo_bench.envs import starts
+from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
@@ -22,10 +22,10 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
         given.append((probing, spiral or plain[-1] is True))
         raise InterruptedError
 
-    for where in (starts, trial):
+    for where in (robot, trial):
         monkeypatch.setattr(where, "replay_and_judge", noted)
-    settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
-    env = Corrected(APOReplay(SCENARIO, probing=True, **settings))
+    settings = {"robot_error": "hand_eye:0.5/0.1", "ft_sensor": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
+    env = Corrected(APOReplay(SCENARIO, probe=True, **settings))
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))
@@ -45,11 +45,11 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
     def noted(*plain, **named):  # type: ignore[no-untyped-def]
-        given.append((named["probing"], named["searches"]))
+        given.append((named["probing"], named["spiral"]))
         raise InterruptedError
 
-    monkeypatch.setattr(starts, "replay_and_judge", noted)
-    env = APOReplay(SCENARIO, wrench="joint-torque", assumed_robot_error="unknown")
+    monkeypatch.setattr(robot, "replay_and_judge", noted)
+    env = APOReplay(SCENARIO, ft_sensor="joint-torque", assumed_robot_error="unknown")
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape, dtype=np.float32))
@@ -57,7 +57,7 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"), [("wrench", "unknown wrench sensor"), ("assumed_robot_error", "unknown stated error")]
+    ("wrong", "said"), [("ft_sensor", "unknown wrench sensor"), ("assumed_robot_error", "unknown stated error")]
 )
 def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -65,12 +65,12 @@ def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
 
 
 def test_whether_it_feels_is_true_or_false() -> None:
-    with pytest.raises(InputError, match="feels of APOReplay must be True or False, got 'no'"):
-        APOReplay(SCENARIO, probing="no")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="wrench of APOReplay must be a text, got None"):
-        APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="probe of APOReplay must be True or False, got 'no'"):
+        APOReplay(SCENARIO, probe="no")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="ft_sensor of APOReplay must be a text, got None"):
+        APOReplay(SCENARIO, ft_sensor=None)  # type: ignore[arg-type]
 
 
 def test_pads_that_do_not_close_square_nothing() -> None:
-    with pytest.raises(InputError, match="the grasp 'weld' was given for a robot that feels"):
-        APOReplay(SCENARIO, probing=True, grasp="weld")
+    with pytest.raises(InputError, match="the grasp 'weld' was given for a method with .probe"):
+        APOReplay(SCENARIO, probe=True, grasp="weld")

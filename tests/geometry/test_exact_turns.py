@@ -124,9 +124,9 @@ def pinned():
     given, at, _ = CONTACTS["shaft in hole"]
     assembly, start, truth = scene(given, at=at)
     demonstration = shown("block_on_block")[2]
-    human_error_scale = np.zeros((2, 6, 6))
+    error = np.zeros((2, 6, 6))
     return assembly, replace(
-        demonstration, assembly=assembly, start=start, goals=truth, final=start, human_error_scale=human_error_scale
+        demonstration, assembly=assembly, start=start, poses=truth, final=start, human_error_covariance=error
     )
 
 

@@ -16,7 +16,7 @@ from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.formats.bop import read_results
 from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
-from apo_bench.io.ordinary_files import read_bytes, read_text
+from apo_bench.io.safe_io import read_bytes, read_text
 from apo_bench.perception.observation.noise_file import read_noise
 from apo_bench.scenario.parts import load_part
 

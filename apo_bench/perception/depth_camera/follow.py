@@ -88,7 +88,7 @@ def follow_demonstration(
             finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m, cast
         )
         group = None if which is None else _moving_model(assembly, surfaces, believed, which)
-        shares, located = _recognise(expected, surfaces, group, which, appearance)
+        shares, located = _find_model(expected, surfaces, group, which, appearance)
         if which is not None and located is not None:
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
@@ -152,7 +152,7 @@ def _find_owners(view: PinholeView, believed: Poses, cast: RayCaster) -> NDArray
     return owner.reshape(pixels.shape)
 
 
-def _recognise(
+def _find_model(
     expected: Expected,
     surfaces: Mapping[str, Surface],
     group: Model | None,

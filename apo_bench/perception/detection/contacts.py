@@ -20,7 +20,13 @@ from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
 from apo_bench.perception.detection.candidate import Candidate, judged
-from apo_bench.perception.detection.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
+from apo_bench.perception.detection.evidence import (
+    DetectedContacts,
+    Evidence,
+    evidence_of,
+    with_contacts,
+    without_contacts,
+)
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
 
 _BEGINNINGS = 12
@@ -28,7 +34,7 @@ _BEGINNINGS = 12
 
 
 @check_arguments
-def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recognised:
+def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> DetectedContacts:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
@@ -53,7 +59,7 @@ def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recogn
         belief = best.belief
         evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
-    return Recognised(with_contacts(assembly, evidence), tuple(evidence))
+    return DetectedContacts(with_contacts(assembly, evidence), tuple(evidence))
 
 
 class _Found(NamedTuple):

@@ -36,7 +36,7 @@ class Rival(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Recognised:
+class DetectedContacts:
     """The assembly with the contacts that were recognised, all of them asked to coincide."""
 
     assembly: Assembly

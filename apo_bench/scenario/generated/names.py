@@ -69,20 +69,20 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
 def write_generated(name: str, folder: Path) -> Path:
     """Write the files of a generated assembly; returns that of the scenario."""
     _, family, seed = whole_name(name).split(":")
-    made, rng = _drawn(family, int(seed))
+    made, rng = _draw(family, int(seed))
     return write(made, lay(made, rng), folder, f"{family}_{seed}")
 
 
-def drawn(name: str) -> Assembled:
+def generate_assembly(name: str) -> Assembled:
     """A generated assembly without a table.
 
     Raises:
         InputError: No such family, or no such seed.
     """
     _, family, seed = whole_name(name).split(":")
-    return _drawn(family, int(seed))[0]
+    return _draw(family, int(seed))[0]
 
 
-def _drawn(family: str, seed: int) -> tuple[Assembled, np.random.Generator]:
+def _draw(family: str, seed: int) -> tuple[Assembled, np.random.Generator]:
     rng = np.random.default_rng([seed, _ASSEMBLY_STREAM, *family.encode()])
     return FAMILIES[family].draw(rng), rng

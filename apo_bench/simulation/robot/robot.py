@@ -204,7 +204,7 @@ class Robot:
         opening = self.opening()
         start = min(max(fingers.commanded(self.data), opening - fingers.slack), opening + fingers.slack)
         ticks = max(1, round(abs(to - start) / self.arm.limits.fingers_m_s / TICK_S))
-        if self.fidelity == "contact" and not self.forces.held:
+        if self.fidelity == "near-contact" and not self.forces.held:
             # Nothing may be near the empty hand, neither as it is nor with its fingers where they go.
             moving = moving_with_tip(self.scene, self.data, self.tip(), max(to, opening), ())
             if clear(self.scene, self.data, moving, self.T):

@@ -79,7 +79,7 @@ def prepare(
     acts = () if probing is None else probing.acts
     at = max(i for i, step in enumerate(plan.schedule) if step.operation == k and not step.undo)
     moves = partial(moves_of, plan, scene, True, acts)
-    robot = Robot(scene, plan.start, Hooks(), "contact", error)
+    robot = Robot(scene, plan.start, Hooks(), "near-contact", error)
     progress = Progress([None] * len(plan.assembly), [])
     keys = [b"%d" % i for i in range(2 * at)]
     with sleeping(scene.work, scene.grasp == "friction"):
@@ -109,7 +109,7 @@ def go_on(
         reached: What it has reached.
     """
     progress = Progress([*start.after, reached], [])
-    other = Robot(robot.scene, start.parts, Hooks(), "contact", error)
+    other = Robot(robot.scene, start.parts, Hooks(), "near-contact", error)
     with sleeping(robot.scene.work, robot.scene.grasp == "friction"):
         take_up(saved_state(robot, 0, progress), other)
         move = moves_of(plan, robot.scene, True, (), error)[start.operation + 1]

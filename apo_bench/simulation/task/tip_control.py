@@ -85,7 +85,7 @@ class TipControl:
         self.nominal = nominal
         self.arrived = False
         """Whether the approach is over and would let go."""
-        self.robot = robot = Robot(scene, start.parts, Hooks(), "contact")
+        self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
         robot.compensate(start.off)
         take_up(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"

@@ -327,7 +327,7 @@ def returning(**changed: Any) -> Callable[[Observation], Correction]:
         ({"gap_after_m": None}, "gap_after_m of Correction must be a number, got None"),
         ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
         (
-            {"schedule": steps("1 2 3"), "targets": np.tile(np.eye(4), (3, 1, 1))},
+            {"schedule": steps("1 2 3"), "step_poses": np.tile(np.eye(4), (3, 1, 1))},
             "returned a last target for operation 1 that is not its goal",
         ),
     ],

@@ -217,7 +217,7 @@ def test_the_level_decides() -> None:
 def test_a_level_or_a_policy_that_is_none_is_refused() -> None:
     for level in (0.0, float("nan")):
         with pytest.raises(InputError, match=r"^a test level of .* was given; a number between 0 and 1 is allowed\.$"):
-            ContactCorrector(noise_level=level)
+            ContactCorrector(level=level)
     with pytest.raises(InputError, match=r"must be one of 'apply', 'warn', 'refuse', 'drop', got 'hope'\.$"):
         ContactCorrector("hope")  # type: ignore[arg-type]
 

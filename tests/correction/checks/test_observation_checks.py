@@ -116,7 +116,7 @@ def test_poses_far_beyond_everything_are_refused() -> None:
         goals[1, 0, 3] = 1e200
         return goals
 
-    for corrector in (away, lambda seen: lying(seen, goals=away(seen))):
+    for corrector in (away, lambda seen: lying(seen, poses=away(seen))):
         with pytest.raises(InputError, match=r"returned a goal for operation 2 with a position of 1e\+200 m; return"):
             correct(seen(), corrector)
     assert correct(seen(), lambda seen: np.full((3, 4, 4), np.inf)).status == "not_finite"

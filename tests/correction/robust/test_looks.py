@@ -41,8 +41,8 @@ def at_the_same_place(name, seed, number):
     """Another look at the demonstration of `look(name, seed)`."""
     first = shown(name, seed)[2]
     other = shown(name, seed + 100 * (number + 1))[2]
-    twists = pose.log(pose.inverse(other.goals) @ fresh(name, seed, number).goals)
-    return replace(look(name, seed), goals=first.goals @ pose.exp(twists))
+    twists = pose.log(pose.inverse(other.poses) @ fresh(name, seed, number).poses)
+    return replace(look(name, seed), poses=first.poses @ pose.exp(twists))
 
 
 def test_where_nothing_is_in_doubt_nobody_asks():
@@ -66,7 +66,7 @@ def test_what_was_left_out_is_looked_at_again_until_it_is_right():
     assert len(again.asked) == 2
     assert found.left_out == ()
     assert "looked again at operation" in found.sentence
-    assert_allclose(found.poses[k][:3, 3], shown(name, 2)[2].goals[k][:3, 3], atol=5e-3)
+    assert_allclose(found.poses[k][:3, 3], shown(name, 2)[2].poses[k][:3, 3], atol=5e-3)
     assert fixed_error_mm(name, 2, found) < 0.35
 
 
@@ -74,7 +74,7 @@ def test_an_operation_of_which_nothing_is_told_is_asked_for():
     observation = look("block_on_block", 0)
     operations = [replace(one, contacts=()) for one in observation.assembly.operations]
     lonely = replace(observation, assembly=replace(observation.assembly, operations=tuple(operations)))
-    missed = replace(lonely, seen=np.array([False, True]))
+    missed = replace(lonely, observed=np.array([False, True]))
     again = Again(replace(at_the_same_place("block_on_block", 0, 0), assembly=lonely.assembly))
     assert correct(missed, "contact-robust", again).ok
     assert again.asked == [(0,)]

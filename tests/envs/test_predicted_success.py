@@ -1,4 +1,4 @@
-"""What a plan promises in the environment, and an environment that abstains."""
+"""Predicted success in the environment, and an environment that abstains."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from apo_bench import TrialConfig, run_trial
+from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
@@ -28,9 +29,7 @@ def test_an_episode_promises_what_its_trial_promises() -> None:
 
 
 def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from apo_bench.envs import starts
-
-    monkeypatch.setattr(starts, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
+    monkeypatch.setattr(robot, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     env = Corrected(APOReplay(SCENARIO, min_predicted_success=1.0))
     env.reset(seed=SEED)
     _, reward, terminated, _, info = env.step(zeros(env))
@@ -39,7 +38,7 @@ def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypa
 
 
 def test_a_probability_is_needed() -> None:
-    with pytest.raises(InputError, match=r"a promise to abstain below of 1\.5 was given; a number from 0 to 1"):
+    with pytest.raises(InputError, match=r"a minimum predicted success of 1\.5 was given; a number from 0 to 1"):
         APOReplay(SCENARIO, min_predicted_success=1.5)
     with pytest.raises(InputError, match="abstain of APOReplay must be a number, got True"):
         APOReplay(SCENARIO, min_predicted_success=True)

@@ -16,7 +16,7 @@ from apo_bench.records import check
 
 
 @final
-class Looks:
+class Reobservations:
     """A `apo_bench.assembly.look.Look`: it knows the demonstration, and hands out nothing but observations.
 
     Each look draws all operations, so that what is seen of one does not depend on which were asked for.
