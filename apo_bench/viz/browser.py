@@ -38,7 +38,7 @@ def no_browser() -> str:
     return ""
 
 
-def serve_story(
+def serve_rollout(
     rollout: Rollout, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False
 ) -> None:
     """Serve a story until `ends` says so, or Ctrl-C.

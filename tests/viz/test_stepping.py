@@ -204,10 +204,10 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
 
 def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
     pytest.importorskip("viser")
-    from apo_bench.viz.browser import serve_story
+    from apo_bench.viz.browser import serve_rollout
 
     said: list[str] = []
-    serve_story(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
+    serve_rollout(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
     assert said[0].startswith("Open http://127.0.0.1:18")
 
 

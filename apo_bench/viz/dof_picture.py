@@ -1,4 +1,4 @@
-"""The free directions of every part, drawn as arrows on the finished assembly, with a sentence for each below."""
+"""The free directions of every part, drawn as arrows on the finished assembly."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,10 +10,10 @@ from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry import Array, Solid, extent
 from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, build_scene, camera_view, picture, pixels
-from apo_bench.viz.explain_text import size
+from apo_bench.viz.dof_text import format_deviation
 from apo_bench.viz.panels import Color, Panel, PanelLine, draw_panels
 
 _SIZE = (900, 540)
@@ -36,7 +36,7 @@ class _DrawnPart(NamedTuple):
 
 
 @default_looks()
-def draw_explanation(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
+def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
     """Write a PNG picture.
 
     Raises:
@@ -57,7 +57,7 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     marks = [_mark(part, free.direction, toward) for part in drawn for free in part.operation.free]
     scene = build_scene(scenario)
     image = picture(scene, poses, *_SIZE, camera, Marks(marks))
-    title = f"{scenario.name}: what no contact fixes ({explanation.freedom} of {6 * len(explanation.goals)} directions)"
+    title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.goals)}"
     figure = draw_panels(title, [Panel(image, [_line(explanation, part) for part in drawn])])
     for mark in marks:
         _write_name(figure.axes[0], mark, pixels(mark.tips, camera, float(scene.shown.model.vis.global_.fovy), *_SIZE))
@@ -89,17 +89,16 @@ def _write_name(axes: Any, mark: Any, tips: Array) -> None:
     from matplotlib.patheffects import withStroke
 
     x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
-    color = tuple(0.75 * c for c in mark.color)
     white = [withStroke(linewidth=3.5, foreground="white")]
-    axes.text(x, y, mark.name, color=color, fontsize=13, weight="bold", ha="center", va="center", path_effects=white)
+    look = {"color": tuple(0.75 * c for c in mark.color), "fontsize": 13, "weight": "bold", "path_effects": white}
+    axes.text(x, y, mark.name, ha="center", va="center", **look)
 
 
 def _line(explanation: Explanation, part: _DrawnPart) -> PanelLine:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
     o = part.operation
-    together = grouped((free.along, f"{free.direction} ({size(free)})") for free in o.free)
     groups = []
-    for along, words in together.items():
+    for along, words in grouped((free.along, f"{free.direction} ({format_deviation(free)})") for free in o.free).items():
         others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
         groups.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
     if o.fixed:

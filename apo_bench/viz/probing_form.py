@@ -1,7 +1,7 @@
-"""What a robot that feels does besides its plan, for a real one: touches, grips that square, laying flat, the search.
+"""The probing motions of a plan for a real robot: contacts, squaring grips, laying flat, the spiral search.
 
-All places and numbers are those of the simulation. Planes are in the frame of the base; a point that touches, and how
-a part lies in the hand, are in the frame of the tip, whatever poses are of.
+All places and numbers are those of the simulation. Planes are in the frame of the base; a point that makes contact, and
+the pose of a part in the hand, are in the frame of the tip, also where poses are of the flange.
 """
 
 from collections.abc import Sequence
@@ -29,11 +29,11 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.viz.robot_form import pose_form, tip_form
 
 
-def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
-    """What `json` can write; mm, N, Nm, s, degrees and unit vectors.
+def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
+    """The JSON object: mm, N, Nm, s, degrees and unit vectors.
 
     Args:
-        sensor: That of the wrist, as in `wrench_noise`.
+        sensor: Force-torque sensor of the wrist, as in `ft_noise`.
 
     Raises:
         InputError: An unknown sensor.
