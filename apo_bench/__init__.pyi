@@ -1,12 +1,14 @@
 """Static types of what `apo_bench` exports; `__init__.py` imports each name when it is first asked for."""
 
 from apo_bench.assembly.correction_record import Correction as Correction
-from apo_bench.assembly.goals import Demonstration as Demonstration
-from apo_bench.assembly.goals import Layout as Layout
-from apo_bench.assembly.goals import Observation as Observation
-from apo_bench.assembly.goals import Plan as Plan
+from apo_bench.assembly.demonstration import Demonstration as Demonstration
+from apo_bench.assembly.demonstration import Layout as Layout
+from apo_bench.assembly.observation import Observation as Observation
+from apo_bench.assembly.plan import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.evaluation import evaluate as evaluate
+from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector

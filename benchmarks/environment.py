@@ -88,13 +88,13 @@ def methods(scenario: str, seeds: Iterable[int]) -> dict[str, int]:
             for human_error_scale in (0.0, 1.0)
         }
         for method in right:
-            noise_level, human_error_scale = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
+            noise_mm, human_error_scale = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
             trial = TrialConfig(
                 scenario,
                 method=method,
                 seed=seed,
-                noise_mm=noise_level,
-                noise_deg=noise_level,
+                noise_mm=noise_mm,
+                noise_deg=noise_mm,
                 human_error_scale=human_error_scale,
                 fidelity=FAST,
             )

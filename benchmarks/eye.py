@@ -26,16 +26,16 @@ from apo_bench.simulation.sensor.rays import ModelRays
 from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream
 
 
-def measured(scene: Scene, shown: SimulatedDemonstration, noise_level: float, seed: int) -> list[dict[str, object]]:
+def measured(scene: Scene, shown: SimulatedDemonstration, noise_mm: float, seed: int) -> list[dict[str, object]]:
     """One entry per operation."""
-    pose_source = range_sensor(scene, shown, noise_level)
+    pose_source = range_sensor(scene, shown, noise_mm)
     began = time.process_time()
     events = pose_source.events(shown.demonstration, pose_source.sensed(stream(seed, OBSERVATION)))
     seconds = time.process_time() - began
     of = {event.operation: event for event in events if event.found is not None}
     rows = []
     for k in range(len(shown.demonstration.assembly)):
-        row = {"operation": k + 1, "seed": seed, "noise_level": noise_level, "found": k in of, "locate_s": seconds}
+        row = {"operation": k + 1, "seed": seed, "noise_mm": noise_mm, "found": k in of, "locate_s": seconds}
         found = of[k].found if k in of else None
         if found is not None:
             xi = pose.log(pose.inverse(found.T) @ shown.demonstration.poses[k])
@@ -105,25 +105,25 @@ def main() -> None:
             if shown.demonstration.code != "ok":
                 continue
             moved.append(max((distance_mm(shown, *item) for item in shifted(shown).items()), default=0.0))
-            for noise_level in args.noise_level:
-                rows += measured(scene, shown, noise_level, seed)
+            for noise_mm in args.noise_mm:
+                rows += measured(scene, shown, noise_mm, seed)
         everything[name] = {"rows": rows, "shifted_mm": moved, "watch_s": watch}
-        for noise_level in args.noise_level:
-            print(line(name, noise_level, [row for row in rows if row["noise_mm"] == noise_level], moved), flush=True)
+        for noise_mm in args.noise_mm:
+            print(line(name, noise_mm, [row for row in rows if row["noise_mm"] == noise_mm], moved), flush=True)
         seconds = [row["locate_s"] for row in rows if row["operation"] == 1]
         print(f"<!-- watch {np.mean(watch):.2f} s, locate {np.mean(seconds):.2f} s of CPU -->", flush=True)
     if args.out:
         args.out.write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
 
 
-def line(name: str, noise_level: float, rows: list[dict[str, object]], moved: list[float]) -> str:
+def line(name: str, noise_mm: float, rows: list[dict[str, object]], moved: list[float]) -> str:
     """One line of the table."""
     found = [row for row in rows if row["found"]]
     mm, deg, chi = (np.array([row[key] for row in found], dtype=float) for key in ("mm", "deg", "chi_square"))
     three = [" ".join(f"{x:.2f}" for x in (np.median(a), np.quantile(a, 0.9), a.max())) for a in (mm, deg)]
     surprises, pixels = (sum(int(row.get(key, 0)) for row in rows) for key in ("surprises", "noticed"))
     return (
-        f"| {name} | {noise_level:g} | {len(found)} of {len(rows)} | {three[0]} | {three[1]} | {chi.mean() / 6:.2f} "
+        f"| {name} | {noise_mm:g} | {len(found)} of {len(rows)} | {three[0]} | {three[1]} | {chi.mean() / 6:.2f} "
         f"| {min(moved):.1f} to {max(moved):.1f} mm, {pixels} pixels, {surprises} |"
     )
 

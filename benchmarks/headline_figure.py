@@ -52,14 +52,14 @@ def draw_levels(axis: Any, look: Look) -> None:
     """Lines over the level; what falls has its name at the left, where the lines are apart."""
     levels = sorted(
         {
-            c.noise_level
+            c.noise_mm
             for c in look.cells
-            if c.human_error_scale == 0.0 and c.noise_level > 0 and c.method in (*LINES, look.corrected)
+            if c.human_error_scale == 0.0 and c.noise_mm > 0 and c.method in (*LINES, look.corrected)
         }
     )
     names: list[tuple[float, str]] = []
     for method in dict.fromkeys((*LINES, look.corrected)):
-        points = [(k, pooled(look.cells, method, noise_level)) for k, noise_level in enumerate(levels)]
+        points = [(k, pooled(look.cells, method, noise_mm)) for k, noise_mm in enumerate(levels)]
         drawn = [(k, rate) for k, rate in points if rate is not None]
         if not drawn:
             continue
@@ -76,7 +76,7 @@ def draw_levels(axis: Any, look: Look) -> None:
         axis.text(
             -0.2, height, WORDS[method], color=REOBSERVE.get(method, SOFT), fontweight="bold", va="center", ha="right"
         )
-    axis.set_xticks(range(len(levels)), [f"{noise_level:g}" for noise_level in levels])
+    axis.set_xticks(range(len(levels)), [f"{noise_mm:g}" for noise_mm in levels])
     axis.set_xlim(-2.1, len(levels) - 0.8)
     axis.set_xlabel("error of the poses seen [mm and degrees]")
     axis.set_title("As seen, searched, corrected", loc="left", fontweight="bold", fontsize=FONT + 2)

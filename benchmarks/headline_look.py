@@ -50,7 +50,7 @@ def look_at(cells: Sequence[Cell]) -> Look:
 def pooled(
     cells: Iterable[Cell],
     method: str,
-    noise_level: float,
+    noise_mm: float,
     noise: str = TrialConfig.noise,
     robot_error: str = TrialConfig.robot_error,
     scenarios: Iterable[str] | None = None,
@@ -60,7 +60,7 @@ def pooled(
     here = [
         cell
         for cell in cells
-        if (cell.method, cell.noise_level, cell.human_error_scale) == (method, noise_level, 0.0)
+        if (cell.method, cell.noise_mm, cell.human_error_scale) == (method, noise_mm, 0.0)
         and (cell.noise, cell.robot_error) == (noise, robot_error)
         and (wanted is None or cell.scenario in wanted)
     ]
@@ -70,8 +70,8 @@ def pooled(
 
 def robot_rate(look: Look, method: str, error: str) -> Rate | None:
     """Success in the scenarios that were run with errors of the robot; the oracle meets no noise."""
-    noise_level = 0.0 if method == "oracle" else TOLD_LEVEL
-    return pooled(look.cells, method, noise_level, robot_error=error, scenarios=robot_scenarios(look.cells))
+    noise_mm = 0.0 if method == "oracle" else TOLD_LEVEL
+    return pooled(look.cells, method, noise_mm, robot_error=error, scenarios=robot_scenarios(look.cells))
 
 
 def robot_scenarios(cells: Iterable[Cell]) -> list[str]:
@@ -111,7 +111,7 @@ def caption(look: Look) -> str:
     plain = [
         cell
         for cell in look.cells
-        if (cell.method, cell.noise_level, cell.human_error_scale) == ("uncorrected", TOLD_LEVEL, 0.0)
+        if (cell.method, cell.noise_mm, cell.human_error_scale) == ("uncorrected", TOLD_LEVEL, 0.0)
     ]
     plain = [cell for cell in plain if cell.noise == TrialConfig.noise]
     seeds = max(cell.trials + cell.excluded for cell in plain)

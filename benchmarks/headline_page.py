@@ -63,14 +63,14 @@ def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement:
         "",
         "They put parts where they belong.",
         "",
-        *rates([c for c in held if c.human_error_scale == 0.0], ("scenario", "method"), named, lambda c: c.noise_level),
+        *rates([c for c in held if c.human_error_scale == 0.0], ("scenario", "method"), named, lambda c: c.noise_mm),
         "",
         "### Careless humans",
         "",
         f"They put parts wrong and adjust them later, as in the paper. {BY_CONSTRUCTION} What stands wrong to each "
         "other before anything is inserted cannot be searched away.",
         "",
-        *rates([c for c in held if c.human_error_scale == 1.0], ("scenario", "method"), named, lambda c: c.noise_level),
+        *rates([c for c in held if c.human_error_scale == 1.0], ("scenario", "method"), named, lambda c: c.noise_mm),
         "",
         *section("## Where it breaks: outliers", OUTLIERS, ("noise", "method"), broken),
         *section("## Where it breaks: the robot's own error", ROBOT, ("robot error", "method"), robot),
@@ -137,7 +137,7 @@ def in_order(cell: Cell) -> tuple[Any, ...]:
         cell.noise,
         cell.scenario,
         (*METHODS, cell.method).index(cell.method),
-        cell.noise_level,
+        cell.noise_mm,
     )
 
 
@@ -149,7 +149,7 @@ def by_error(cell: Cell) -> tuple[Any, ...]:
 def of_robot(cell: Cell, scenarios: Sequence[str]) -> bool:
     """Whether a cell has an error of the robot, or is the same without one."""
     same = cell.scenario in scenarios and cell.noise == TrialConfig.noise and cell.human_error_scale == 0.0
-    return same and ROBOT_METHODS.get(cell.method) == cell.noise_level
+    return same and ROBOT_METHODS.get(cell.method) == cell.noise_mm
 
 
 def named(cell: Cell) -> tuple[str, ...]:

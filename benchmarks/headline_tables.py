@@ -82,7 +82,7 @@ def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
         at = p.place
         low, high = (100 * x for x in p.interval)
         lines.append(
-            f"| {at.scenario} | {'human_error_scale' if at.human_error_scale else 'careful'} | {at.noise_level:g} | {at.noise} | `{at.method}` "
+            f"| {at.scenario} | {'human_error_scale' if at.human_error_scale else 'careful'} | {at.noise_mm:g} | {at.noise} | `{at.method}` "
             f"| {p.pairs} | {p.only_method} | {p.only_reference} "
             f"| {100 * (p.difference or 0.0):+.1f} ({low:+.1f} to {high:+.1f}) | {p.p_adjusted:.2g} |"
         )

@@ -36,7 +36,7 @@ from apo_bench.envs.apo_insert import APOInsert
 from apo_bench.envs.dagger_insert import MIRRORS, SHAPES, VECTORS, DaggerInsert
 from apo_bench.envs.policies import expert
 from benchmarks.insertion import Spiral, Straight
-from benchmarks.made_with import with_mujoco
+from benchmarks.provenance import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
 WEIGHTS = ROOT / "assets" / "learned" / "insert.npz"

@@ -27,7 +27,7 @@ import numpy as np
 
 from apo_bench import InputError
 from benchmarks.learn_insert import FIRST, made
-from benchmarks.made_with import with_mujoco
+from benchmarks.provenance import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "learn_ppo.jsonl"

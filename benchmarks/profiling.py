@@ -23,6 +23,7 @@ import mujoco
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
@@ -88,7 +89,7 @@ def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
     try:
         for each in plans:
             began = time.process_time()
-            passed += replay(each, scene, fidelity=fidelity).sim_time_s
+            passed += replay(each, scene, config=ExecutionConfig(fidelity)).sim_time_s
             whole += time.process_time() - began
     finally:
         mujoco.mj_step = step

@@ -53,7 +53,7 @@ def write_page(lines: Sequence[Line], scores: Sequence[float] = SCORES, rates: S
 
 
 def condition_of(line: Line) -> Hashable:
-    return line["method"], line["noise"], line["noise_level"], line["robot_error"]
+    return line["method"], line["noise"], line["noise_mm"], line["robot_error"]
 
 
 def cell_of(line: Line) -> Hashable:
@@ -111,11 +111,11 @@ def conditions(planned: Sequence[Line], predicted_success: Array, right: Array) 
     keys = [condition_of(line) for line in planned]
     for key in dict.fromkeys(keys):
         own = np.array([each == key for each in keys])
-        method, noise, noise_level, error = key
+        method, noise, noise_mm, error = key
         auc = within([0] * int(own.sum()), predicted_success[own], right[own])
         noise = noise.split(":")[-1].removeprefix("benchmarks/")
         made.append(
-            f"| `{method}` | {noise} | {noise_level} | {error} | {own.sum()} | {100 * right[own].mean():.0f} % | "
+            f"| `{method}` | {noise} | {noise_mm} | {error} | {own.sum()} | {100 * right[own].mean():.0f} % | "
             f"{100 * predicted_success[own].mean():.0f} % | {'–' if np.isnan(auc) else f'{auc:.2f}'} |"
         )
     return made

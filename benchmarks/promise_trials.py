@@ -11,6 +11,7 @@ from typing import NamedTuple
 from apo_bench.assembly import Observation
 from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
@@ -40,7 +41,7 @@ SCENES = (
 SLOW = ("gearbox",)
 """Scenarios of every `EACH`th seed, since each of their trials takes as long as a dozen others."""
 EACH = 3
-COLUMNS = ("set", "scenario", "seed", "method", "noise", "noise_level", "robot_error", "success", "code", "score")
+COLUMNS = ("set", "scenario", "seed", "method", "noise", "noise_mm", "robot_error", "success", "code", "score")
 
 
 class Condition(NamedTuple):
@@ -48,16 +49,16 @@ class Condition(NamedTuple):
 
     method: str
     noise: str
-    noise_level: float = 1.0
+    noise_mm: float = 1.0
     robot_error: str = "none"
 
 
 CONDITIONS = (
     *(Condition("contact-robust", noise) for noise in ("megapose-tless", "benchmarks/gross.toml")),
     *(Condition("contact-robust", kind) for kind in ("flips", "stale", "swaps", "rays", "displaced-view")),
-    *(Condition("contact-robust", "isotropic", noise_level) for noise_level in (8.0, 2.0)),
+    *(Condition("contact-robust", "isotropic", noise_mm) for noise_mm in (8.0, 2.0)),
     *(Condition("contact", noise) for noise in ("megapose-tless", "stale", "flips")),
-    *(Condition("snap", "isotropic", noise_level) for noise_level in (0.1, 0.25)),
+    *(Condition("snap", "isotropic", noise_mm) for noise_mm in (0.1, 0.25)),
     Condition("uncorrected", "isotropic", 0.1),
     *(
         Condition("contact-robust", "isotropic", 1.0, error)
@@ -123,13 +124,13 @@ def _scene(scenario: str) -> Scene:
 
 
 def _settings(scenario: str, clearance_mm: float, seed: int, condition: Condition) -> TrialConfig:
-    noise_level = condition.noise_level
+    noise_mm = condition.noise_mm
     named = condition._asdict()
-    del named["noise_level"]
+    del named["noise_mm"]
     return TrialConfig(
         scenario,
-        noise_mm=noise_level,
-        noise_deg=noise_level,
+        noise_mm=noise_mm,
+        noise_deg=noise_mm,
         clearance_mm=clearance_mm,
         seed=seed,
         fidelity="near-contact",
@@ -143,14 +144,14 @@ def _trials(kind: str, name: str, scenario: str, scene: Scene, seed: int) -> Ite
     cache = ReplayCache()
     for condition in CONDITIONS if simulated.demonstration.code == "ok" else ():
         success, code, score = _trial(replace(first, **_fields(condition)), scene, simulated, cache)
-        cells = (kind, name, seed, *condition._replace(noise_level=f"{condition.noise_level:g}"), success, code, score)
+        cells = (kind, name, seed, *condition._replace(noise_mm=f"{condition.noise_mm:g}"), success, code, score)
         yield dict(zip(COLUMNS, map(str, cells), strict=True))
 
 
 def _fields(condition: Condition) -> dict[str, object]:
     fields = condition._asdict()
-    noise_level = fields.pop("noise_level")
-    return fields | {"noise_mm": noise_level, "noise_deg": noise_level}
+    noise_mm = fields.pop("noise_mm")
+    return fields | {"noise_mm": noise_mm, "noise_deg": noise_mm}
 
 
 def _trial(
@@ -165,5 +166,6 @@ def _trial(
     score = plan_score(made.plan, explained, scene, settings.robot_error)
     error = draw_robot_error(settings.robot_error, scene, settings.seed)
     truth = simulated.layout.poses
-    attempt = replay_and_judge(made.plan, scene, truth, None, settings.fidelity, cache, error=error)
+    config = ExecutionConfig(settings.fidelity, robot_error=error)
+    attempt = replay_and_judge(made.plan, scene, truth, None, config, cache)
     return str(int(attempt.verdict.success)), trial_outcome(attempt).code, repr(score)

@@ -21,8 +21,8 @@ import gymnasium
 import numpy as np
 
 import apo_bench  # noqa: F401  # registers the environments
-from benchmarks.made_with import with_mujoco
 from benchmarks.measured_parts import measured
+from benchmarks.provenance import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "throughput.json"

@@ -49,8 +49,8 @@ def draw_film(method: str, path: Path) -> None:
     """One picture of the film of a replay: how it ended where it failed, else the stick on its way in."""
 
     def keep(rollout: Rollout) -> None:
-        replayed = rollout.chapters[-1]
-        inside = [m for m in replayed.moments if m.doing.operation == 2 and m.doing.macro.startswith("insert")]
+        replayed = rollout.segments[-1]
+        inside = [m for m in replayed.moments if m.phase.operation == 2 and m.phase.macro.startswith("insert")]
         shown = replayed.moments if method == "uncorrected" else inside[: 3 * len(inside) // 4]
         *_, ended = pictures = [
             picture

@@ -22,7 +22,7 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.formats.observation import as_planned
 from apo_bench.resources import folder
 from apo_bench.scenario.parts.making import rectangle
-from apo_bench.simulation.arms.arm import read_description
+from apo_bench.simulation.arms.description import read_description
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"

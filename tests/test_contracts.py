@@ -23,7 +23,7 @@ BREACHES = {
         ("apo_bench.correction.contact.contact", "apo_bench.simulation.scene.world"),
         ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact.contact"),
         ("apo_bench.scenario.file", "apo_bench.trial.trial"),
-        ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
+        ("apo_bench.geometry.pose", "apo_bench.assembly.poses"),
         ("apo_bench.perception.observation.noise", "apo_bench.trial.trial"),
     ],
     "scenario": [
@@ -82,8 +82,8 @@ BREACHES = {
         ("apo_bench.correction.contact.starts", "apo_bench.correction.contact.contact"),
     ],
     "calibration": [
-        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
-        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.robot_estimate"),
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.robot_estimate"),
     ],
     "importers-used": [
         ("apo_bench.trial.trial", "apo_bench.importers.recording.importing"),
@@ -120,7 +120,7 @@ BREACHES = {
     "records": [
         ("apo_bench.benchmark.report.report", "apo_bench.trial.trial"),
         ("apo_bench.benchmark.analysis.rates", "apo_bench.simulation.scene.scene"),
-        ("apo_bench.records.settings", "apo_bench.assembly.goals"),
+        ("apo_bench.records.settings", "apo_bench.assembly.poses"),
     ],
     "simulators": [
         ("apo_bench.envs.apo_replay", "mujoco"),

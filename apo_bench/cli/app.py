@@ -78,7 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # the command line library leaves like this when the reader of a pipe is gone
         if not isinstance(error.__context__, OSError):
             raise
-        return _complain(streams.unexpected(error.__context__), NO_RESULT)
+        streams.give_up_output()
+        return 0
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise

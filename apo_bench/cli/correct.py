@@ -68,10 +68,10 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
-        from apo_bench.perception.observation.models.fitted import restated
+        from apo_bench.perception.observation.models.fitted import restate
         from apo_bench.perception.observation.noise_file import read_noise
 
-        observed = restated(observed, *read_noise(camera_noise))
+        observed = restate(observed, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
         correction = correct(observed, corrector)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
+from apo_bench.assembly import Correction, Observation, Reobserver, ReobservingCorrector, project_observation
 from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near, check_observations
 from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
 from apo_bench.correction.contact.contact import ContactCorrector
@@ -30,14 +30,14 @@ class CorrectorMisbehaved(InputError):
 
 
 @check_arguments
-def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | None = None) -> Correction:
+def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reobserver | None = None) -> Correction:
     """What the corrector makes of an observation.
 
     Args:
         corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
             bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
-        look: Sees operations again. It is handed to the method `looking(observation, look)` of a corrector that has
-            one, which is called in place of the corrector itself; any other gets nothing.
+        reobserve: Observes operations again. A corrector with a method `correct_and_reobserve` (`ReobservingCorrector`)
+            gets it, and that method is called in place of the corrector; any other gets nothing.
 
     Raises:
         InputError: There is no such corrector, or the observation makes no sense.
@@ -49,11 +49,11 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
     ours = _ours(chosen)
     # The equations know planes alone, so correctors of the package get round faces lowered to planes; `contact` lowers
     # by itself what others hand it, and leaves this as it is.
-    flat = lowered_observation(observation)
+    flat = project_observation(observation)
     given = flat if ours else observation
     try:
-        looks = look is not None and isinstance(chosen, LookingCorrector)
-        returned = chosen.looking(given, look) if looks else chosen(given)
+        reobserves = reobserve is not None and isinstance(chosen, ReobservingCorrector)
+        returned = chosen.correct_and_reobserve(given, reobserve) if reobserves else chosen(given)
         correction = _admitted(returned, flat, chosen, name)
         if flat is observation or correction.believed is None:
             return correction

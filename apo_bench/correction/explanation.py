@@ -25,8 +25,8 @@ from apo_bench.assembly import (
     Observation,
     Operation,
     Poses,
-    lowered_observation,
     placements,
+    project_observation,
 )
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.problem import problem_of
@@ -147,7 +147,7 @@ def explain(observation: Observation, goals: Array | Correction, dropped: Collec
         dropped = (*goals.dropped, *dropped)
         observation = goals.believed or observation
         goals = goals.poses
-    observation = lowered_observation(observation)
+    observation = project_observation(observation)
     n = len(goals)
     assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:

@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import ODL, Assembly, Observation, SharedError, inverted, joint_covariance, simplified
+from apo_bench.assembly import ODL, Assembly, Observation, SharedError, invert, joint_covariance, simplify
 from apo_bench.correction.solvers import (
     RANK_CUT_OFF,
     CompactEquations,
@@ -52,7 +52,7 @@ def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
     for i, arc in enumerate(assembly.arcs(), start=1):
         contact, made, lost = relations[arc[0]]
         a, b = assembly.given(contact)
-        word = simplified((*inverted(history[made].get(a.part, ())), *history[made].get(b.part, ())))
+        word = simplify((*invert(history[made].get(a.part, ())), *history[made].get(b.part, ())))
         holds.append(RelationHold(f"R{i}", (a.part, b.part), made, lost, word))
     return tuple(holds)
 

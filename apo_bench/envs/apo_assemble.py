@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from apo_bench.assembly import Outcome, Snapshot
-from apo_bench.envs.apo_insert import TIME_LIMIT, APOInsert, Seen, ended
+from apo_bench.envs.apo_insert import APOInsert, Seen, ended
 from apo_bench.errors import require
 from apo_bench.simulation.task.tip_control import TipControl
 
@@ -33,8 +33,7 @@ class APOAssemble(APOInsert):
 
     ## Episode End
     As in `APOInsert-v0`, after the last operation; before that, where the robot cannot pick the next part, where
-    something collides, is dropped or is pushed too hard. Each operation has an equal share of `max_episode_steps`
-    (1000); at its end the hand opens.
+    something collides, is dropped or is pushed too hard. After `horizon` actions of an operation the hand opens.
 
     ## Arguments
     Those of `APOInsert-v0` but `operation` and `probe`.
@@ -53,11 +52,6 @@ class APOAssemble(APOInsert):
         self.share /= n
         seen = {**self.observation_space.spaces, "operation": spaces.Box(0.0, 1.0, (n,), np.float32)}  # type: ignore[attr-defined]
         self.observation_space = spaces.Dict(seen)
-
-    @property
-    def _time_limit(self) -> int:
-        n = len(self.scene.scenario.assembly)
-        return max(1, ((self.spec and self.spec.max_episode_steps) or n * TIME_LIMIT) // n)
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
         """Begin the next operation, or ask the judge after the last one."""

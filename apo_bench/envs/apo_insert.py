@@ -35,7 +35,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.robot import Halt
+from apo_bench.simulation.robot import ExecutionAborted
 from apo_bench.simulation.scene import Scene, build_scene, data_with_arm
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
@@ -47,8 +47,8 @@ RELEASE = 0.5
 """The last number of an action above which the hand opens; below its negative it stays closed."""
 MOST_TRIES = 100
 """Trials in a row that fail before the operation after which `reset()` gives up."""
-TIME_LIMIT = 200
-"""Actions of an episode where `max_episode_steps` is not set."""
+HORIZON = 200
+"""Default number of actions of an operation."""
 _REWARDS = ("judge", "progress")
 _STARTS = ("training", "evaluation")
 _PLANS = ("uncorrected", "oracle", "nominal")
@@ -96,8 +96,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     ## Episode End
     It terminates when the hand opens, when the filtered force on the part (8 Hz) exceeds `fails_above_n`, and when
-    something collides or is dropped. After `max_episode_steps` (200) it is truncated: the hand opens and the judge
-    decides. `info` then holds `success` (also as `is_success`), `code` and `sentence`.
+    something collides or is dropped. After `horizon` actions it is truncated: the hand opens and the judge decides.
+    `info` then holds `success` (also as `is_success`), `code` and `sentence`; before, `success` is False.
 
     ## Arguments
     - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as in
@@ -108,6 +108,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
       approach.
     - `residual`: whether actions are added to the approach; if not, they alone move the tip.
     - `shift_mm`, `turn_deg`: translation and rotation of an action of 1.
+    - `horizon`: actions of an episode. Another one than 200 is also given to `gymnasium.make` as `max_episode_steps`.
     - `fails_above_n`: force that ends an episode.
     - `reward`: `judge` or `progress`.
     - `starts`: `training` or `evaluation`: what `reset()` without a seed draws.
@@ -142,6 +143,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         residual: bool = True,
         shift_mm: float = 1.0,
         turn_deg: float = 0.5,
+        horizon: int = HORIZON,
         fails_above_n: float = 60.0,
         reward: str = "judge",
         layouts: int = 16,
@@ -160,7 +162,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             raise InputError(unknown("kind of starts", str(starts), _STARTS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
             require(0.0 < size < math.inf, f"{name} {size!r} was given; a number above 0 is allowed.")
-        require(layouts > 0, f"layouts {layouts!r} was given; a whole number above 0 is allowed.")
+        for name, count in (("horizon", horizon), ("layouts", layouts)):
+            require(count > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         check("seed", first_trial)
         self.render_mode = render_mode
         require(
@@ -185,6 +188,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._residual = bool(residual)
         self.scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
         """Translation and rotation of an action of 1, (6,), [m, rad]."""
+        self._horizon = int(horizon)
         self._fails_above_n = fails_above_n
         self.share = float(reward == "progress")
         """The share of the reward that is for progress."""
@@ -232,11 +236,6 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     def operation(self) -> int:
         """The operation of this episode, from 1."""
         return self._now().start.operation + 1
-
-    @property
-    def _time_limit(self) -> int:
-        """Actions of an operation."""
-        return (self.spec and self.spec.max_episode_steps) or TIME_LIMIT
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Start at a trial; `seed=k` is trial k.
@@ -301,11 +300,12 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             self._best = min(before, -float(control.feel.tip[2]))
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
-        except Halt as halt:
-            info = self._ended_by(halt.code, halt.part)
+        except ExecutionAborted as aborted:
+            info = self._ended_by(aborted.code, aborted.part)
         self._over = bool(info)
         truncated = self._over and self._out_of_time
-        reward = shared + float(info.get("success", False))
+        info = info or {"success": False}
+        reward = shared + float(info["success"])
         return self._seen(), reward, self._over and not truncated, truncated, info
 
     def render(self) -> Any:
@@ -374,7 +374,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         if control.force_n > self._fails_above_n:
             return self._ended_by("force_stop")
         opens = grip > RELEASE or (self._residual and control.arrived and grip >= -RELEASE)
-        self._out_of_time = not opens and len(self._actions) == self._time_limit
+        self._out_of_time = not opens and len(self._actions) == self._horizon
         return self._done(control, control.let_go()) if opens or self._out_of_time else {}
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
@@ -395,7 +395,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             self._at_work(),
             self._now().covariance,
             self._best,
-            self._time_limit - len(actions),
+            self._horizon - len(actions),
             actions[-1] if actions else np.zeros(7, dtype=np.float32),
         )
         return {**seen, "pixels": self._picture(PIXELS, PIXELS)} if self._pixels else seen

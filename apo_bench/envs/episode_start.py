@@ -14,13 +14,12 @@ from apo_bench.perception.observation.noise import Noise
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.task.start import Start, go_on, prepare
+from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
 from apo_bench.simulation.task.tip_control import TipControl
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
     WRENCH,
     demonstration_failure,
-    draw_robot_error,
     observe_demonstration,
     simulate_demonstration,
     stream_key,
@@ -87,9 +86,9 @@ class Trials(NamedTuple):
         if made.plan is None:
             assert made.failure is not None
             return made.failure
-        error = draw_robot_error(robot.robot_error, scene, trial)
+        config = robot.execution(made.plan, scene, trial)
         sensor = robot.ft_sensor, (*stream_key(trial, WRENCH), 1)
-        start = prepare(made.plan, scene, k, error, robot.probing(made.plan, scene, trial), sensor)
+        start = prepare_start(made.plan, scene, k, replace(config, time_limit_s=math.inf), sensor)
         if isinstance(start, Outcome):
             return start
         before = judged(scene, start.after, start.after[-1], simulated.layout.poses[:k]) if k else None
@@ -97,13 +96,20 @@ class Trials(NamedTuple):
             code = before.rests_on.code
             return Outcome("judge", code, None, f"the operations before are not right: {before.rests_on.why or code}")
         return EpisodeStart(
-            trial, start, made.plan, error, simulated.layout.poses, _stated(seen, made.correction, robot.assumed)
+            trial,
+            start,
+            made.plan,
+            config.robot_error,
+            simulated.layout.poses,
+            _stated(seen, made.correction, robot.assumed),
         )
 
     def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:
         """The start of the next operation after one is done; or the failure on the way there."""
         key = (*stream_key(begun.trial, WRENCH), 1 + len(begun.reference))
-        start = go_on(begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.ft_sensor, key))
+        start = prepare_next_start(
+            begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.ft_sensor, key)
+        )
         return start if isinstance(start, Outcome) else replace(begun, start=start)
 
 

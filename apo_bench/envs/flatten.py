@@ -32,7 +32,9 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         super().__init__(env)
         seen = spaces.flatten_space(env.observation_space)
         assert isinstance(seen, spaces.Box)
-        self.observation_space = self._seen = spaces.Box(seen.low.astype(np.float32), seen.high.astype(np.float32), dtype=np.float32)
+        self.observation_space = self._seen = spaces.Box(
+            seen.low.astype(np.float32), seen.high.astype(np.float32), dtype=np.float32
+        )
         self._size = sum(map(_size, _parts(env.action_space).values()))
         self.action_space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
 
@@ -49,9 +51,7 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         """
         given = np.asarray(action, dtype=np.float32)
         if not self.action_space.contains(given):
-            raise InputError(
-                f"the action {shown(action)} was given; {self._size} numbers from -1 to 1 are allowed."
-            )
+            raise InputError(f"the action {shown(action)} was given; {self._size} numbers from -1 to 1 are allowed.")
         seen, reward, terminated, truncated, info = self.env.step(self._action(given))
         return self._flat(seen), float(reward), terminated, truncated, info
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array
 from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_ft_sensor, checked_robot_error
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import WRENCH, Attempt, draw_robot_error, replay_and_judge, stream_key
 from apo_bench.trial.trial import probing_config
@@ -39,11 +40,16 @@ class RobotSettings(NamedTuple):
         """The robot error that the robot assumes, as in `robot_sigmas`; None if it is unknown."""
         return assumed_error(self.assumed_robot_error, self.robot_error)
 
-    def probing(self, plan: Plan, scene: Scene, trial: int) -> Any:
-        """The configuration of its probing; None of a robot that does not probe."""
-        if not self.probe:
-            return None
-        return probing_config(plan, scene, self.assumed, stream_key(trial, WRENCH), self.ft_sensor)
+    def execution(self, plan: Plan, scene: Scene, trial: int, fidelity: str = "full") -> ExecutionConfig:
+        """How it executes a plan in a trial, which determines its errors and the noise of its sensor."""
+        probing = probing_config(plan, scene, self.assumed, stream_key(trial, WRENCH), self.ft_sensor)
+        return ExecutionConfig(
+            fidelity,
+            spiral=self.probe,
+            time_limit_s=LONGEST_REPLAY_S,
+            robot_error=draw_robot_error(self.robot_error, scene, trial),
+            probing=probing if self.probe else None,
+        )
 
 
 def execute_plan(
@@ -54,16 +60,7 @@ def execute_plan(
     Args:
         reference: As in `replay_and_judge`.
         trial: Number of the trial, which determines the robot's errors and the noise of its sensor.
-        watch, fidelity: As in `replay_and_judge`.
+        watch: As in `replay_and_judge`.
+        fidelity: As in `ExecutionConfig`.
     """
-    return replay_and_judge(
-        plan,
-        scene,
-        reference,
-        watch,
-        fidelity,
-        spiral=robot.probe,
-        most_s=LONGEST_REPLAY_S,
-        error=draw_robot_error(robot.robot_error, scene, trial),
-        probing=robot.probing(plan, scene, trial),
-    )
+    return replay_and_judge(plan, scene, reference, watch, robot.execution(plan, scene, trial, fidelity))

@@ -6,7 +6,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Reached, Snapshot, lowered_observation, placements
+from apo_bench.assembly import Observation, Reached, Snapshot, placements, project_observation
 from apo_bench.correction.baselines.track import nested, next_operation, reached_back
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers import LENGTH_M
@@ -39,7 +39,7 @@ Policy = Callable[[Tracked], tuple[Act, ...]]
 
 def paper_track_policy(known: Tracked) -> tuple[Act, ...]:
     """The corrector `paper-track`, act by act: free the most recent candidates until every contact holds."""
-    seen = lowered_observation(known.observation)
+    seen = project_observation(known.observation)
     if not seen.observed.all():
         return ()
     step = next_operation(seen, known.placed, nested)

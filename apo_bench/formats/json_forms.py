@@ -16,7 +16,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from apo_bench.assembly import Observation, OutlierModel, Plan, Poses, SharedError, Tails
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io import Finite, NotNegative, Positive, Quadruple, Table, Text, Triple, write_file
+from apo_bench.io import Finite, NotNegative, Positive, Quadruple, Table, Text, Triple, check_quaternion, write_file
 
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
 PLAN_SCHEMA = "apo-bench/plan/2"
@@ -42,14 +42,24 @@ class PoseForm(Table, frozen=True, kw_only=True):
     position_mm: Position
     quaternion_wxyz: Quadruple
 
+    def matrix(self, place: str) -> Array:
+        """Return the pose, (4, 4), [m].
 
-class PlannedOperation(Table, frozen=True, kw_only=True):
-    """The goal of an operation."""
+        Args:
+            place: File and key, for the message.
+
+        Raises:
+            InputError: The quaternion is not of length 1.
+        """
+        q = check_quaternion(self.quaternion_wxyz, f"{place}, quaternion_wxyz")
+        return pose.unpack(np.concatenate([np.array(self.position_mm) * 1e-3, q]))
+
+
+class PlannedOperation(PoseForm, frozen=True, kw_only=True):
+    """The target pose of an operation."""
 
     operation: Number
     part: Text
-    position_mm: Position
-    quaternion_wxyz: Quadruple
 
 
 class ObservedOperation(PlannedOperation, frozen=True, kw_only=True):

@@ -30,13 +30,12 @@ from apo_bench.formats.json_forms import (
     PlanForm,
     PlannedOperation,
     PoseForm,
-    Position,
     SharedForm,
     StepForm,
     TailsForm,
 )
-from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, check_quaternion, convert_typed, read_typed
+from apo_bench.geometry import Array
+from apo_bench.io import convert_typed, read_typed
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -130,13 +129,7 @@ def _check_operations(file: str, entries: Sequence[PlannedOperation], assembly: 
 
 
 def _goals(file: str, entries: Sequence[PlannedOperation]) -> Array:
-    poses = [_pose(e.position_mm, e.quaternion_wxyz, f"{file}, operation {e.operation}") for e in entries]
-    return np.array(poses).reshape(-1, 4, 4)
-
-
-def _pose(position_mm: Position, quaternion_wxyz: Quadruple, place: str) -> Array:
-    q = check_quaternion(quaternion_wxyz, f"{place}, quaternion_wxyz")
-    return pose.unpack(np.concatenate([np.array(position_mm) * 1e-3, q]))
+    return np.array([e.matrix(f"{file}, operation {e.operation}") for e in entries]).reshape(-1, 4, 4)
 
 
 def _poses(file: str, forms: dict[str, PoseForm], assembly: Assembly) -> Poses:
@@ -144,10 +137,7 @@ def _poses(file: str, forms: dict[str, PoseForm], assembly: Assembly) -> Poses:
         require_known("part", part, tuple(assembly.solids), place=f"{file}, start")
     for part in assembly.solids:
         require(part in forms, f"{file}, start: the key '{part}' is missing.")
-    return {
-        part: _pose(forms[part].position_mm, forms[part].quaternion_wxyz, f"{file}, start, {part}")
-        for part in assembly.solids
-    }
+    return {part: forms[part].matrix(f"{file}, start, {part}") for part in assembly.solids}
 
 
 def _target(file: str, step: StepForm, goals: Array) -> Array:
@@ -157,7 +147,7 @@ def _target(file: str, step: StepForm, goals: Array) -> Array:
         return np.asarray(goals[step.operation - 1])
     if isinstance(step.position_mm, UnsetType) or isinstance(step.quaternion_wxyz, UnsetType):
         raise InputError(f"{place}: position_mm and quaternion_wxyz are needed together, or none of them.")
-    return _pose(step.position_mm, step.quaternion_wxyz, place)
+    return PoseForm(position_mm=step.position_mm, quaternion_wxyz=step.quaternion_wxyz).matrix(place)
 
 
 def _outliers(file: str, form: Mapping[str, Any]) -> OutlierModel:
@@ -179,14 +169,11 @@ def _shared(file: str, form: SharedForm, n: int) -> SharedError:
     once = len(set(form.operations)) == m > 0 and max(form.operations) <= n
     require(once, f"{place}, operations: operations from 1 to {n}, each once, are needed.")
     require(form.local is UNSET or form.frame is not UNSET, f"{place}, local: state the frame, or leave this out.")
-    frame = None
-    if not isinstance(form.frame, UnsetType):
-        frame = _pose(form.frame.position_mm, form.frame.quaternion_wxyz, f"{place}, frame")
     return SharedError(
         name=form.name,
         operations=tuple(k - 1 for k in form.operations),
         covariance=_covariance(form.covariance_mm_deg, f"{place}, covariance_mm_deg", definite=False),
-        frame=frame,
+        frame=None if isinstance(form.frame, UnsetType) else form.frame.matrix(f"{place}, frame"),
         local=form.local is True,
         correlation=None if form.correlation is UNSET else _correlation(form.correlation, m, f"{place}, correlation"),
     )

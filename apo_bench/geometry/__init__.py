@@ -19,7 +19,7 @@ from apo_bench.geometry.penetration import (
     upright_bounds,
     ways_out,
 )
-from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straightened
+from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straighten
 from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, extent, world_bounds
@@ -32,7 +32,7 @@ from apo_bench.geometry.symmetry import (
     revolution,
     symmetries,
     turn_about,
-    turned_alike,
+    turn_alike,
 )
 from apo_bench.geometry.twist import ADJOINTS, GENERATORS, SERIES, exp_and_jacobian, right_jacobian
 
@@ -113,10 +113,10 @@ __all__ = (
     "separating_axes",
     "shadow",
     "sides_of",
-    "straightened",
+    "straighten",
     "symmetries",
     "turn_about",
-    "turned_alike",
+    "turn_alike",
     "union_mesh",
     "upright_bounds",
     "ways_out",

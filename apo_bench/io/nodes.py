@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
-from apo_bench.io.documents import parse_plain, read_plain, show_value
+from apo_bench.io.documents import read_plain, show_value
 from apo_bench.io.safe_io import LARGEST_BYTES
 from apo_bench.io.safe_text import UNSHOWN
 
@@ -124,16 +124,6 @@ class JsonNode:
     def flag(self) -> bool:
         self.require(isinstance(self.value, bool), "true or false is needed")
         return self.value
-
-
-def read_json(path: str | Path) -> JsonNode:
-    """The document in a file; see `read_typed`."""
-    return JsonNode(read_plain(path, "JSON file", syntax="json"), str(path))
-
-
-def parse_json(text: str, file: str) -> JsonNode:
-    """The document in a text; `file` is its name in messages."""
-    return JsonNode(parse_plain(text, file, "json"), file)
 
 
 def read_toml(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> JsonNode:

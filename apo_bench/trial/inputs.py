@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.io import opened
-from apo_bench.names import admit
+from apo_bench.names import find_own_module
 from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
@@ -155,7 +155,6 @@ def _imports(file: Path, home: Path) -> Iterator[tuple[str, ...]]:
 
 def _located(module: str) -> ModuleSpec | None:
     """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
-    admit(module)
     spec = None
     path = None
     for end in range(1, module.count(".") + 2):
@@ -163,6 +162,8 @@ def _located(module: str) -> ModuleSpec | None:
         try:
             specs = (finder.find_spec(name, path) for finder in sys.meta_path)
             spec = next((each for each in specs if each is not None), None)
+            if spec is None and path is None:
+                spec = find_own_module(name)
             path = None if spec is None else spec.submodule_search_locations
         except (ImportError, ValueError, KeyError, AttributeError):
             return None

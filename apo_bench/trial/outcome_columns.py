@@ -31,7 +31,7 @@ from apo_bench.assembly import (
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers import LENGTH_M
-from apo_bench.geometry import Array, pose, turned_alike
+from apo_bench.geometry import Array, pose, turn_alike
 from apo_bench.io import clean
 from apo_bench.perception.observation.wrong_contacts import culprit
 from apo_bench.records import (
@@ -100,9 +100,7 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
-    return np.array([T if solid is None else turned_alike(solid, T, true) for solid, T, true in pairs]).reshape(
-        -1, 4, 4
-    )
+    return np.array([T if solid is None else turn_alike(solid, T, true) for solid, T, true in pairs]).reshape(-1, 4, 4)
 
 
 def _rms_mm(error: Array, operations: int) -> float:

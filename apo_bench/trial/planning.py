@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 from scipy.optimize import least_squares
 
-from apo_bench.assembly import Correction, Look, Observation, Outcome, Plan, largest_gap
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reobserver, largest_gap
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.failure import predict
@@ -97,7 +97,7 @@ def apply_method(
     method: Any,
     observation: Observation,
     truth: Array | None,
-    look: Look | None = None,
+    reobserve: Reobserver | None = None,
     where: Scene | Scenario | None = None,
 ) -> MethodResult:
     """What a method would have the robot do.
@@ -107,7 +107,7 @@ def apply_method(
             anything else is a corrector or names one.
         observation: As the planner has it: its contacts may be missed, false or recognised, and are those of the plan.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
-        look: What a corrector that can ask sees operations again by.
+        reobserve: What a corrector that can ask sees operations again by.
         where: What the plan of a corrector is to be carried out in: what contacts leave free is chosen so that it fits
             there. None: it stays as the corrector left it.
     """
@@ -117,7 +117,7 @@ def apply_method(
         return _uncorrected(observation, observation.poses, observation_failure(observation))
     if isinstance(method, str) and method == "nominal" and where is not None:
         return _by_heart(observation, where)
-    correction = correct(observation, with_simulated(method), look)
+    correction = correct(observation, with_simulated(method), reobserve)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)

@@ -23,7 +23,7 @@ from scipy.special import ndtr, ndtri
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.verdict import least_overlaps
+from apo_bench.judging.finished import least_overlaps
 from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario

@@ -196,7 +196,7 @@ def run_settings(request: Request, spec: TrialConfig, show: Show | None = None) 
         return row
     rollout = trial_story(spec, scene, seen, track, row, simulated)
     if request.video:
-        write_film(scene.scenario.assembly, rollout.assembled, rollout.chapters, request.video)
+        write_film(scene.scenario.assembly, rollout.assembled, rollout.segments, request.video)
     if show is not None:
         show(rollout)
     return row

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.correction.calibration import UNKNOWN, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
@@ -31,8 +31,8 @@ from apo_bench.records import (
 )
 from apo_bench.records.run.validation import unwritable
 from apo_bench.scenario import scenario_names
-from apo_bench.simulation.execution import ReplayCache
-from apo_bench.simulation.execution.probing.feeling import ACTS, ProbingConfig
+from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
@@ -72,22 +72,22 @@ def probing_config(
     stated: str | None,
     seed: tuple[int, ...],
     ft_sensor: str = USUAL_FT_SENSOR,
-    acts: tuple[str, ...] = ACTS,
+    actions: tuple[str, ...] = PROBING_ACTIONS,
 ) -> ProbingConfig:
     """A robot that is told how wrong it may be, and finds out how wrong it is.
 
     Args:
         stated: Standard deviations of its errors, as in a row; None: nobody says, and what is usual is assumed.
         seed: Of the noise of the sensor at its wrist.
-        wrench: That sensor, as in a row.
-        acts: What it does besides.
+        ft_sensor: That sensor, as in a record.
+        actions: Of `PROBING_ACTIONS`.
 
     Raises:
         InputError: An unknown kind of error, or a number that is not allowed.
     """
     sigmas = UNKNOWN if stated is None else robot_sigmas(stated)
-    belief = believe(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(belief, slip_sigmas(sigmas), seed, ft_sensor, acts)
+    estimate = prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
+    return ProbingConfig(estimate, slip_sigmas(sigmas), seed, ft_sensor, actions)
 
 
 MEASURED: TrialRecord = {"noise_mm": None, "noise_deg": None, "human_error_scale": None, "noise": "measured"}
@@ -284,16 +284,15 @@ def _carry_out(
         return result(abstained(predicted_success, settings.min_predicted_success), success=False)
     _, spiral, probe = parse_method(settings.method)
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.secret_seed)
-    probing = _feels(settings, plan, scene) if probe else None
-    attempt = replay_and_judge(
-        plan, scene, reference, watch, settings.fidelity, cache, spiral, error=error, probing=probing
-    )
+    probing = _probing(settings, plan, scene) if probe else None
+    config = ExecutionConfig(settings.fidelity, spiral, robot_error=error, probing=probing)
+    attempt = replay_and_judge(plan, scene, reference, watch, config, cache)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: TrialRecord = {"joint_control": scene.arm.control}
     return end | driven | replay_columns(attempt, plan, truth)
 
 
-def _feels(settings: TrialConfig, plan: Plan, scene: Scene) -> ProbingConfig:
+def _probing(settings: TrialConfig, plan: Plan, scene: Scene) -> ProbingConfig:
     """How the robot feels: it is told standard deviations, never what was drawn."""
     told = assumed_error(settings.assumed_robot_error, settings.robot_error)
     return probing_config(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Hypothesis, spelled
+from apo_bench.assembly import Hypothesis, spell
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation
 from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
@@ -64,7 +64,7 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
             {
                 "part": part.part,
                 "placed": part.placed + 1,
-                "odl": spelled(part.odl),
+                "odl": spell(part.odl),
                 **pose_form(part.pose),
                 "rank": part.rank,
                 "fixed": list(part.fixed),
@@ -167,6 +167,6 @@ def _hold_form(hold: RelationHold) -> dict[str, Any]:
         "parts": list(hold.parts),
         "made": hold.made + 1,
         "lost": None if hold.lost is None else hold.lost + 1,
-        "equation": spelled(hold.word),
+        "equation": spell(hold.word),
         "operations": sorted({term.operation + 1 for term in hold.word}),
     }

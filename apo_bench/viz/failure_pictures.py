@@ -111,7 +111,7 @@ def _draw_again(row: TrialRecord, spec: TrialConfig) -> Any:
     if rollout is None or any(now.get(name) != row.get(name) for name in _SAME):
         return None
     poses = _poses(now["reached"])
-    last = rollout.chapters[-1].moments[-1].qpos
+    last = rollout.segments[-1].moments[-1].qpos
     camera = _camera(rollout.scene, row, poses)
     return picture_with_arm(rollout.scene, poses, last, *_SIZE, camera, _mark(row, rollout.scene, poses))
 

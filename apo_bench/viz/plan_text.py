@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Plan, placements, spelled
+from apo_bench.assembly import Plan, placements, spell
 from apo_bench.formats.json_forms import pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.io import columns, direction
@@ -66,7 +66,7 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     lines = []
     for (k, undo), T in zip(plan.schedule, plan.step_poses, strict=True):
         main = everything[k].main
-        before = spelled(odls[k - 1][main]) if k and main in odls[k - 1] else "start"
+        before = spell(odls[k - 1][main]) if k and main in odls[k - 1] else "start"
         made = tuple(f"R{i}" for i, of in enumerate(relations, start=1) if (of.lost if undo else of.made) == k)
         came_from, target, back_to = (f"T{k + 1}", None, before) if undo else (before, T, "")
         lines.append(PlanLine(k, undo, everything[k], came_from, made, scenario.grasps[k], target, back_to))

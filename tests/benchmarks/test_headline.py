@@ -95,9 +95,7 @@ def test_the_table_is_that_of_the_rows() -> None:
     }
     assert len(counted) == len(lines) - 1
     for cell in tally(kept_rows()):
-        line = counted[
-            cell.scenario, cell.noise, cell.method, cell.noise_level, cell.human_error_scale, cell.robot_error
-        ]
+        line = counted[cell.scenario, cell.noise, cell.method, cell.noise_mm, cell.human_error_scale, cell.robot_error]
         assert (int(line["trials"]), int(line["successes"])) == (cell.trials, cell.successes)
 
 
@@ -121,7 +119,7 @@ def test_the_first_look_is_the_same_on_every_page_and_that_of_the_rows(page: Pat
 def cell(method: str, successes: int, **more: Any) -> Cell:
     """Ten trials at level 1, a careful human."""
     first = next(c for c in tally(kept_rows()) if c.scenario == "stick_in_tower")
-    plain = replace(first, human_error_scale=0.0, noise_level=1.0, noise_deg=1.0, trials=10, excluded=0)
+    plain = replace(first, human_error_scale=0.0, noise_mm=1.0, noise_deg=1.0, trials=10, excluded=0)
     return replace(plain, **{"method": method, "successes": successes, "demonstrated": successes, **more})
 
 
@@ -134,7 +132,7 @@ CELLS = [
     cell("contact-robust", 6, noise="megapose-tless"),
     cell("contact-robust", 3, robot_error="hand_eye:0.5/0.1"),
     cell("contact-robust+spiral", 7, robot_error="hand_eye:0.5/0.1"),
-    cell("oracle", 4, noise_level=0.0, robot_error="hand_eye:0.5/0.1"),
+    cell("oracle", 4, noise_mm=0.0, robot_error="hand_eye:0.5/0.1"),
 ]
 
 
@@ -152,10 +150,10 @@ def test_the_oracle_under_an_error_of_the_robot_is_found_at_level_zero() -> None
 def test_every_rate_stands_in_its_line_and_column() -> None:
     shown = [
         cell("uncorrected", 1),
-        cell("uncorrected", 3, noise_level=2.0),
-        cell("spiral-search", 5, noise_level=2.0, demonstrated=4),
+        cell("uncorrected", 3, noise_mm=2.0),
+        cell("spiral-search", 5, noise_mm=2.0, demonstrated=4),
     ]
-    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.noise_level)
+    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.noise_mm)
     assert lines == ["| method | 1 | 2 |", "|---|--:|--:|", "| none | 10 | 30 |", "| search |  | 50 (40) |"]
 
 

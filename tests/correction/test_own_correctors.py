@@ -55,7 +55,7 @@ class Asking:
     def __call__(self, seen):
         return seen.poses
 
-    def looking(self, seen, look):
+    def correct_and_reobserve(self, seen, look):
         raise ValueError(f"{look.left} looks")
 
 asking = Asking()

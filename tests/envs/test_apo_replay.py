@@ -188,7 +188,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
         def __call__(self, seen: Observation) -> Any:
             return pytest.fail("it can look again")
 
-        def looking(self, seen: Observation, look: Any) -> Any:
+        def correct_and_reobserve(self, seen: Observation, look: Any) -> Any:
             again.append(look([1]))
             return correct(seen, "contact")
 
@@ -456,7 +456,7 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
     true = robot.replay_and_judge
 
     def replay_and_judge(*args: Any, **more: Any) -> Any:
-        asked.append(args[4])
+        asked.append(args[4].fidelity)
         return true(*args, **more)
 
     monkeypatch.setattr(REPLAY, replay_and_judge)

@@ -40,5 +40,5 @@ def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypa
 def test_a_probability_is_needed() -> None:
     with pytest.raises(InputError, match=r"a minimum predicted success of 1\.5 was given; a number from 0 to 1"):
         APOReplay(SCENARIO, min_predicted_success=1.5)
-    with pytest.raises(InputError, match="abstain of APOReplay must be a number, got True"):
+    with pytest.raises(InputError, match="min_predicted_success of APOReplay must be a number, got True"):
         APOReplay(SCENARIO, min_predicted_success=True)

@@ -18,8 +18,8 @@ SCENARIO = "block_on_block"
 def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def noted(*plain, probing=None, spiral=False, **named):  # type: ignore[no-untyped-def]
-        given.append((probing, spiral or plain[-1] is True))
+    def noted(*plain):  # type: ignore[no-untyped-def]
+        given.append(plain[4])
         raise InterruptedError
 
     for where in (robot, trial):
@@ -31,21 +31,20 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
         env.step(np.zeros(env.action_space.shape))
     with pytest.raises(InterruptedError):
         trial.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
-    (ours, spiral), (theirs, also_searches) = given
-    assert spiral
-    assert also_searches
-    assert (ours.wrench, ours.seed, ours.acts) == (theirs.wrench, theirs.seed, theirs.acts)
-    assert ours.wrench == "0.5/0.025"
+    assert all(config.spiral for config in given)
+    ours, theirs = (config.probing for config in given)
+    assert (ours.ft_sensor, ours.seed, ours.actions) == (theirs.ft_sensor, theirs.seed, theirs.actions)
+    assert ours.ft_sensor == "0.5/0.025"
     np.testing.assert_array_equal(ours.slip, theirs.slip)
     for name in ("mean", "sigmas", "middle"):
-        np.testing.assert_array_equal(getattr(ours.belief, name), getattr(theirs.belief, name))
+        np.testing.assert_array_equal(getattr(ours.estimate, name), getattr(theirs.estimate, name))
 
 
 def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def noted(*plain, **named):  # type: ignore[no-untyped-def]
-        given.append((named["probing"], named["spiral"]))
+    def noted(*plain):  # type: ignore[no-untyped-def]
+        given.append((plain[4].probing, plain[4].spiral))
         raise InterruptedError
 
     monkeypatch.setattr(robot, "replay_and_judge", noted)

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from apo_bench import Criteria, Verdict, judge
 from apo_bench.assembly import Reached, placements
 from apo_bench.geometry import pose
-from apo_bench.judging.contacts import FAULTS
-from apo_bench.judging.verdict import fixtures
+from apo_bench.judging.finished import fixtures
+from apo_bench.judging.judgement import FAULTS
 from apo_bench.records import CODES, Thresholds
 from tests import scenes
 from tests.end_states import (

@@ -3,7 +3,7 @@
 import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, load_scenario
-from apo_bench.assembly import LookingCorrector
+from apo_bench.assembly import ReobservingCorrector
 from apo_bench.benchmark.analysis import rank
 from apo_bench.benchmark.sweeps.grid import units
 from apo_bench.names import resolve
@@ -111,7 +111,7 @@ def test_what_a_robot_that_feels_is_given_is_nothing_to_others():
 
 def test_methods_that_may_look_are_those_that_can_ask():
     for name in CORRECTORS:
-        assert may_reobserve(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
+        assert may_reobserve(name) == isinstance(resolve(name, CORRECTORS, "corrector"), ReobservingCorrector)
     assert may_reobserve("contact-robust+spiral")
     assert may_reobserve("mine:correct")
     assert not any(map(may_reobserve, ("oracle", "uncorrected", "spiral-search")))

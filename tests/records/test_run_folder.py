@@ -10,7 +10,6 @@ import json
 import os
 import random
 import resource
-import shutil
 import signal
 import time
 from collections.abc import Callable
@@ -66,41 +65,6 @@ def row(seed: int) -> dict[str, Any]:
 
 def line(seed: int) -> bytes:
     return json.dumps(row(seed)).encode() + b"\n"
-
-
-@pytest.mark.parametrize("what", ["folder", "other"])
-def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path) -> None:
-    folder = tmp_path / "deep" / "run"
-    with RunFolder(folder, run()) as store:
-        for seed in range(4):
-            store.append(row(seed), {"seed": seed})
-            if what == "folder" and seed in (1, 3):
-                shutil.rmtree(folder.parent)
-            elif what == "other" and seed == 2:
-                (folder / "trials.jsonl").replace(folder / "elsewhere")
-                (folder / "trials.jsonl").write_text("forged")
-        assert [one["seed"] for one in store.rows()] == [0, 1, 2, 3]
-    assert (folder / "trials.jsonl").read_bytes() == b"".join(map(line, range(4)))
-    assert (folder / "timing.jsonl").read_bytes().count(b"\n") == 4
-    with RunFolder(folder, run()) as store:
-        assert len(store.finished) == 4
-
-
-def test_rows_that_are_cut_off_meanwhile_are_said_to_be_lost(tmp_path: Path) -> None:
-    with RunFolder(tmp_path, run()) as store:
-        store.append(row(0), {})
-        os.truncate(tmp_path / "trials.jsonl", 10)
-        with pytest.raises(RuntimeError, match=r"were removed from .* by somebody else, and are lost"):
-            store.append(row(1), {})
-
-
-def test_a_place_where_nothing_can_be_put_back_is_one_sentence(tmp_path: Path) -> None:
-    with RunFolder(tmp_path / "run", run()) as store:
-        store.append(row(0), {})
-        shutil.rmtree(tmp_path / "run")
-        (tmp_path / "run").write_text("a file stands here")
-        with pytest.raises(RuntimeError, match=r"cannot be put back \("):
-            store.append(row(1), {})
 
 
 def write(folder: Path, seeds: range, pause_s: float = 0.0) -> None:

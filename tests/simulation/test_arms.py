@@ -13,13 +13,14 @@ from apo_bench.geometry import Array, pose
 from apo_bench.records.run.replay_command import own_code
 from apo_bench.resources import folder
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
-from apo_bench.simulation.arms.arm import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.chain import find_flange
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.simulation.arms.kinematics import Kinematics, tip_down, with_home
+from apo_bench.simulation.arms.home import tip_down, with_home
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
-from apo_bench.simulation.robot.reach import along, led_there, way_there, within_speed
+from apo_bench.simulation.robot.reach import along, follow_waypoints, limit_speed, plan_waypoints
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.viz.arm_text import check_lines
 
@@ -154,13 +155,13 @@ def test_a_line_takes_as_long_as_the_joints_need() -> None:
     end[:3, 3] += (0.1, 0.2, -0.1)
     line = smooth(kinematics.forward(q), end, 5.0)
     most = np.full(6, 0.5)
-    slower, knots = within_speed(kinematics, line, q, most)
+    slower, knots = limit_speed(kinematics, line, q, most)
     t = np.linspace(0.0, 1.0, 201)
     path = along(kinematics, slower, slower.progress(t), q)
     assert path is not None
     fastest = np.abs(np.gradient(path, slower.seconds / 200, axis=0)).max()
     assert fastest == pytest.approx(0.5, rel=0.02)
-    assert within_speed(kinematics, line, q, np.full(6, 50.0))[0] is line
+    assert limit_speed(kinematics, line, q, np.full(6, 50.0))[0] is line
     shared = along(kinematics, slower, slower.progress(t), q, knots)
     assert np.array_equal(shared, path), "what was solved for the speed is what would be solved again"
 
@@ -296,15 +297,15 @@ def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> N
     ends = [tip_down(base + np.array((0.05, side * 0.45, 0.35)), turn) for side, turn in ((-1, -1.0), (1, 1.0))]
     q = kinematics.inverse(ends[0], np.array(arm.home) + np.array([-1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert q is not None
-    assert led_there(kinematics, ends[0], ends[1:], q) is None
-    middle, end = way = way_there(kinematics, arm, ends[0], ends[1], q)
-    assert led_there(kinematics, ends[0], way, q) is not None
+    assert follow_waypoints(kinematics, ends[0], ends[1:], q) is None
+    middle, end = way = plan_waypoints(kinematics, arm, ends[0], ends[1], q)
+    assert follow_waypoints(kinematics, ends[0], way, q) is not None
     np.testing.assert_array_equal(end, ends[1])
     assert middle[0, 3] - base[0] == pytest.approx(np.hypot(0.05, 0.45), rel=0.02)
     near = tip_down(base + np.array((0.3, -0.4, 0.3)), -1.0)
-    assert len(way_there(kinematics, arm, ends[0], near, q)) == 1
+    assert len(plan_waypoints(kinematics, arm, ends[0], near, q)) == 1
     usual = find_arm("six_axis")
-    assert len(way_there(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
+    assert len(plan_waypoints(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
 
 
 def test_an_arm_waits_with_no_joint_wound_up() -> None:

@@ -110,7 +110,7 @@ def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytes
     """Two operations carry parts that touch, and the stick falls from a hand in which it hung still."""
     quick = shown("pocket_table", 1.0, 2).demonstration
     monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
-    monkeypatch.setattr(demonstration, "sleeping", lambda world, allowed: nullcontext())
+    monkeypatch.setattr(demonstration, "allow_sleep", lambda world, allowed: nullcontext())
     whole = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     pairs = [*zip(whole.poses, quick.poses, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]
     off = np.array([pose.log(pose.inverse(a) @ b) for a, b in pairs])

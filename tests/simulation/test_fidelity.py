@@ -9,14 +9,15 @@ import pytest
 
 from apo_bench import InputError, Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
+from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import ForceSensors
-from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
+from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose, timestep
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -50,7 +51,7 @@ ASKED = [("paper-track", 1.0), ("uncorrected", 1.0), ("paper", 1.0), ("paper", 0
 
 @pytest.mark.parametrize(
     ("fidelity", "grasp", "asked"),
-    [("contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
+    [("near-contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
 )
 def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
     cache = ReplayCache()
@@ -62,9 +63,9 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     cache = ReplayCache()
     plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.poses)
-    first = replay(plan, scene(), fidelity="near-contact", cache=cache)
+    first = replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), fidelity="near-contact", cache=cache) is first
+    assert replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():
@@ -76,7 +77,7 @@ def test_marks_differ_where_anything_that_led_there_differs():
     a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
     assert a[:-1] == b[:-1]
     assert a[-1] != b[-1]
-    assert not set(a) & set(cache_keys(scene(), layout.start, "contact", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", moves(plan, scene())))
     elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
     assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
 
@@ -132,7 +133,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
 def test_contact_simulates_less_and_passes_as_much_time():
     layout = shown().layout
     plan = Plan(scene().scenario.assembly, layout.start, layout.poses)
-    full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "contact"))
+    full, contact = (replay(plan, scene(), config=ExecutionConfig(fidelity)) for fidelity in ("full", "near-contact"))
     assert full.outcome.code == contact.outcome.code == "ok"
     assert contact.sim_time_s == pytest.approx(full.sim_time_s, abs=0.5)
     for part, T in full.reached.final.poses.items():
@@ -214,13 +215,13 @@ def test_nothing_is_left_out_while_something_moves():
 def test_sleep_ends_with_the_replay():
     options = scene().work.model.opt
     before = int(options.enableflags)
-    with sleeping(scene().work, True):
+    with allow_sleep(scene().work, True):
         assert options.enableflags & SLEEP
     assert options.enableflags == before
-    with pytest.raises(IndexError), sleeping(scene().work, True):
+    with pytest.raises(IndexError), allow_sleep(scene().work, True):
         [][0]
     assert options.enableflags == before
-    row("oracle", "contact")
+    row("oracle", "near-contact")
     assert options.enableflags == before
 
 

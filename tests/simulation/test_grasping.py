@@ -11,6 +11,7 @@ from apo_bench.geometry import Array, Box, intrusion_depths, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.parts.making import Body, extrude, polygon, rectangle
 from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.grasping import (
     RestingPart,
     clear_across,
@@ -193,7 +194,9 @@ def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
         np.testing.assert_allclose(move.transfer.grips[0].T_part_tip[:3, 2], ahead, atol=1e-12)
         assert is_tilted(move.transfer.T_world_start @ move.transfer.grips[0].T_part_tip)
     layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene, fidelity="near-contact")
+    result = replay(
+        Plan(scene.scenario.assembly, layout.start, layout.poses), scene, config=ExecutionConfig("near-contact")
+    )
     assert result.outcome.code == "ok"
 
 

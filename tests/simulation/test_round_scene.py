@@ -16,7 +16,7 @@ from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.composing import room_with_parts
 from apo_bench.simulation.scene.walls import simulated_pieces
-from apo_bench.simulation.scene.world import World, initial_state, part_pose, place
+from apo_bench.simulation.scene.world import World, initial_state, part_pose, set_part_pose
 from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario
 
 
@@ -45,7 +45,7 @@ def made_of(scene: Scene, part: str) -> list[Piece]:
 def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
     T = pose.at((0.2, -0.1, 0.3), (20.0, -50.0, 130.0))
     data = initial_state(scene.work, scene.scenario.start)
-    place(scene.work, data, "plate", T)
+    set_part_pose(scene.work, data, "plate", T)
     mujoco.mj_kinematics(scene.work.model, data)
     for piece in made_of(scene, "plate"):
         assert isinstance(piece, Hull)
@@ -144,11 +144,11 @@ def test_flat_ends_that_graze_a_round_part_are_not_found_deep_inside_of_it(tmp_p
     data = initial_state(its, start | {"table": np.eye(4)})
     rng = np.random.default_rng(0)
     stub = pose.at((0.3, 0.2, 0.3))
-    place(its, data, "stub", stub)
+    set_part_pose(its, data, "stub", stub)
     for _ in range(200):
         at = (*rng.normal(scale=1e-6, size=2), 0.04 - SAGITTA_M + rng.normal(scale=1e-8))
         turn = (*rng.normal(size=2) * 10.0 ** rng.uniform(-7, -4), rng.uniform(-20, 20))
-        place(its, data, "plate", stub @ pose.at(at, turn))
+        set_part_pose(its, data, "plate", stub @ pose.at(at, turn))
         mujoco.mj_fwdPosition(its.model, data)
         assert data.contact.dist.min() > -1e-5
 
@@ -157,7 +157,7 @@ def test_a_peg_stands_on_its_end_and_one_that_lies_stays(scene: Scene):
     for turn in ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 30.0)):
         data = initial_state(scene.shown, scene.scenario.start)
         T = pose.at((0.1, 0.1, 0.025 if turn == (0.0, 0.0, 0.0) else 0.005), turn)
-        place(scene.shown, data, "peg", T)
+        set_part_pose(scene.shown, data, "peg", T)
         mujoco.mj_step(scene.shown.model, data, 1500)
         off = pose.inverse(T) @ part_pose(scene.shown, data, "peg")
         assert np.abs(off[:3, 3]).max() < 2e-5  # without friction of rolling one that lies is centimetres away

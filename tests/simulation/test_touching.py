@@ -13,10 +13,10 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, wrist_of, zero
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import shifted, smooth, steady
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import READING_S, WristSensor, part_loads
-from apo_bench.simulation.scene.world import part_pose, place, sleeping
+from apo_bench.simulation.scene.world import allow_sleep, part_pose, set_part_pose
 
 DOWN = np.array([0.0, 0.0, -1.0])
 UP = -DOWN
@@ -53,7 +53,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     start = dict(scene.scenario.start)
     start["stick"] = pose.at((0.1, 0.16, 0.01))
     robot = Robot(scene, start)
-    place(scene.work, robot.data, "stick", start["stick"])
+    set_part_pose(scene.work, robot.data, "stick", start["stick"])
     wrist = wrist_of(robot, name, np.random.default_rng(1), **settings)
     T = np.array(robot.T)
     T[:3, 0] = 0.0, -1.0, 0.0
@@ -108,7 +108,7 @@ def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
 @pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False), ("panda_primitive", True)])
 def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
-    with sleeping(scene.work, asleep):
+    with allow_sleep(scene.work, asleep):
         robot, wrist = empty_hand(scene, "wrist", 0.014)
         left = press(robot, steady(robot.T, shifted(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
         assert left is not None
@@ -148,7 +148,7 @@ class Pushing:
 def test_a_push_on_the_table_is_felt_as_the_contacts_exert_it(arm: str, newton: float) -> None:
     """Force and torque about the tip, against the contact sensor and the sum over all contacts, within 5 mN, 1 mNm."""
     scene = scene_of(arm)
-    with sleeping(scene.work, False):
+    with allow_sleep(scene.work, False):
         robot, wrist = empty_hand(scene, "ideal", 0.0102)
         comply(robot, Pushing(newton, 1.5), robot.T[:3, 3], wrist)
         tip = robot.T[:3, 3]
@@ -250,7 +250,7 @@ def test_an_offset_in_six_directions_is_gone_to(arm: str) -> None:
 def test_where_the_arm_does_not_reach_it_gives_up() -> None:
     robot, wrist = empty_hand(scene_of(), "ideal", 0.1)
     far = iter(range(1, 10_000))
-    with pytest.raises(Halt, match="unreachable"):
+    with pytest.raises(ExecutionAborted, match="unreachable"):
         comply(robot, lambda _: np.array([0.0004 * next(far), 0, 0, 0, 0, 0]), robot.T[:3, 3], wrist)
     assert (robot.wrist, robot.fidelity) == (None, "full")
 

@@ -12,9 +12,10 @@ from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import FtNoise
 from apo_bench.simulation.robot.by_wrist import reading, wrist_of, zero
+from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, WristSensor
-from apo_bench.simulation.scene.world import wrist_felt
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, WristSensor
+from apo_bench.simulation.scene.world import wrist_sensors_on
 
 ARMS = ("six_axis", "ur5e_primitive")
 POSES = (((0.1, 0.16, 0.2), (0, 0, 0)), ((0.2, -0.1, 0.25), (20, 0, 0)), ((0.1, 0.1, 0.22), (0, -25, 40)))
@@ -150,16 +151,16 @@ def test_the_sensors_of_the_wrist_are_off_unless_they_are_asked(tower: Scene) ->
     for _ in range(3):
         mujoco.mj_step(model, data)
     assert not data.sensordata[-6:].any()
-    with wrist_felt(model):
+    with wrist_sensors_on(model):
         mujoco.mj_step(model, data)
         assert data.sensordata[-6:].any()
-        with pytest.raises(RuntimeError), wrist_felt(model):
+        with pytest.raises(RuntimeError), wrist_sensors_on(model):
             raise RuntimeError
         assert model.sensor_needstage[-2:].tolist() == [3, 3]
     assert model.sensor_needstage[-2:].tolist() == [0, 0]
 
 
-def test_a_motion_is_the_same_to_the_byte_while_the_wrist_feels(tower: Scene) -> None:
+def test_a_motion_is_the_same_to_the_byte_while_the_wrist_config(tower: Scene) -> None:
     ends = []
     for probing in (False, True):
         robot = Robot(tower, tower.scenario.start)

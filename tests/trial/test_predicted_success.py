@@ -15,6 +15,7 @@ from apo_bench.benchmark.analysis import tally
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
 from apo_bench.records import TrialRecord
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
@@ -124,7 +125,7 @@ def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
     plan = correct(seen, "contact").plan(seen)
     error = draw_robot_error(error_name, pocket, SEED)
     assert error is not None
-    reached = replay(plan, pocket, fidelity="near-contact", error=error).reached
+    reached = replay(plan, pocket, config=ExecutionConfig("near-contact", robot_error=error)).reached
     states = brought(plan, pocket, error)
     resting = [snapshot for snapshot in reached.after if snapshot is not None]
     for before, state, operation in zip(resting, states[1:], plan.assembly.operations[1:], strict=False):

@@ -23,7 +23,7 @@ from apo_bench.benchmark.sweeps.stopping import stoppable
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, environment
-from apo_bench.names import OwnModules, folder_of_own_modules
+from apo_bench.names import add_own_modules, folder_of_own_modules
 from apo_bench.records import TrialRecord
 from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.request import Request, checked_request, lost_request, run_request
@@ -135,8 +135,7 @@ def prepare_process(folder: str) -> None:
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     os.environ.pop(SAFE_PATH)
-    if folder:
-        sys.meta_path.append(OwnModules(folder))
+    add_own_modules(folder)
 
 
 def _start(pool: ProcessPool) -> None:

@@ -20,10 +20,10 @@ from apo_bench.assembly import (
     Assembly,
     Correction,
     Observation,
+    faces_away,
     largest,
     largest_gap,
-    looking_away,
-    lowered_observation,
+    project_observation,
 )
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
@@ -64,7 +64,7 @@ def opposing(observation: Observation, correction: Correction) -> Correction:
     if not correction.ok:
         return correction
     assembly = observation.assembly
-    away = looking_away(assembly, observation.start, correction.poses)
+    away = faces_away(assembly, observation.start, correction.poses)
     if correction.dropped:
         away &= assembly.without(correction.dropped)
     if not away.any():
@@ -112,7 +112,7 @@ def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()
     Args:
         dropped: Relations, or single contacts, that do not count.
     """
-    observation = lowered_observation(observation)
+    observation = project_observation(observation)
     plain = equations(observation.assembly, observation.start, observation.poses)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     return largest(violations(system, exact, inequalities, goals)[observation.assembly.without(dropped)])

@@ -25,7 +25,7 @@ from apo_bench.assembly import (
     Iterate,
     Observation,
     Suspect,
-    lowered_together,
+    project_observations,
 )
 from apo_bench.correction.checks.status import TEST_LEVEL, opposing, refused_correction, status_sentence
 from apo_bench.correction.contact.problem import Problem, problem_of
@@ -135,7 +135,7 @@ class ContactCorrector:
             InputError: As of one.
         """
         # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
-        observations = lowered_together(observations)
+        observations = project_observations(observations)
         results = [None if all(each.observed.tolist()) else refused_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(

@@ -221,7 +221,7 @@ def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, ch
     gaps = problem.gaps(goals, forms)
     worst_m = gaps.max(axis=1, initial=0.0).tolist()
     kept_m = worst_m if all_kept else gaps[:, kept].max(axis=1, initial=0.0).tolist()
-    away = np.any(problem.laid.looking_away(forms), axis=1).tolist()
+    away = np.any(problem.laid.faces_away(forms), axis=1).tolist()
     far = turned_far(problem.goals, goals).tolist()
     at_rest = nearest.at_rest.tolist()
     finite = nearest.finite.tolist()

@@ -19,7 +19,7 @@ from apo_bench.correction.solvers.inequalities import (
 )
 from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
-from apo_bench.correction.solvers.play import LaidContacts, fit_covariance, laid_contacts, plays
+from apo_bench.correction.solvers.play import ProjectedContacts, fit_covariance, plays, project_vertices
 from apo_bench.correction.solvers.posterior import (
     LARGEST_POSTERIOR,
     RANK_CUT_OFF,
@@ -51,8 +51,8 @@ __all__ = (
     "Freedom",
     "Inequalities",
     "Kernels",
-    "LaidContacts",
     "NearestGoals",
+    "ProjectedContacts",
     "Solution",
     "Whitened",
     "active_rank",
@@ -66,7 +66,6 @@ __all__ = (
     "fit_covariance",
     "freedom_of",
     "jacobian_rank",
-    "laid_contacts",
     "least_step",
     "linearised_by",
     "marginals",
@@ -74,6 +73,7 @@ __all__ = (
     "nearest_goals",
     "noise_factor",
     "plays",
+    "project_vertices",
     "projections",
     "scales",
     "settled_basis",

@@ -153,7 +153,7 @@ _ONE = np.eye(4)
 
 @final
 @dataclass(frozen=True, eq=False)
-class LaidContacts:
+class ProjectedContacts:
     """The equations of all contacts, and their vertices, laid at some goals."""
 
     system: CompactEquations
@@ -164,9 +164,9 @@ class LaidContacts:
     """(*, c, 4): as of `CompactEquations.forms`, at these goals."""
     pattern: Pattern
 
-    def only(self, some: slice) -> "LaidContacts":
+    def only(self, some: slice) -> "ProjectedContacts":
         """Those of some of the observations."""
-        return LaidContacts(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
+        return ProjectedContacts(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
 
     def gaps(self, forms: Array) -> Array:
         """The largest |e| of each contact, (*, c), [m]."""
@@ -175,12 +175,12 @@ class LaidContacts:
         e = (forms.take(self.pattern.contact, axis=-2) * self.vertex).sum(axis=-1)
         return np.asarray(np.maximum.reduceat(np.abs(e), self.pattern.begin[:-1], axis=-1))
 
-    def looking_away(self, forms: Array) -> NDArray[np.bool_]:
-        """Which contacts have faces that do not look at each other, (*, c), as `looking_away` has it."""
+    def faces_away(self, forms: Array) -> NDArray[np.bool_]:
+        """Which contacts have faces that do not look at each other, (*, c), as `faces_away` has it."""
         return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
 
 
-def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> LaidContacts:
+def project_vertices(assembly: Assembly, start: Array, plane: Array, goals: Array) -> ProjectedContacts:
     """The equations of all contacts of an assembly, vertices where they are at the goals, (*, n, 4, 4).
 
     Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
@@ -198,7 +198,7 @@ def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) 
     vertex = (maps.take(corners.pattern.contact, axis=-3) @ corners.vertex)[..., 0]
     points = corners.points @ np.swapaxes(maps, -1, -2)
     forms = (plane[:, None] @ products)[..., 0, :]
-    return LaidContacts(CompactEquations(corners.words, constants, plane, points), vertex, forms, corners.pattern)
+    return ProjectedContacts(CompactEquations(corners.words, constants, plane, points), vertex, forms, corners.pattern)
 
 
 class _Corners(NamedTuple):

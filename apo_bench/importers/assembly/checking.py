@@ -19,7 +19,7 @@ from apo_bench.importers.assembly.waiting import stance
 from apo_bench.io import read_bytes
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
-from apo_bench.simulation.arm_checks.arm_check import place_in_reach
+from apo_bench.simulation.arm_checks.placing import place_in_reach
 from apo_bench.simulation.arm_checks.plan_check import struck_by
 from apo_bench.simulation.execution import after_transfer, key_angles, moves
 from apo_bench.simulation.scene import Scene, build_scene

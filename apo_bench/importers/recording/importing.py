@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.geometry import Array, turned_alike
+from apo_bench.geometry import Array, turn_alike
 from apo_bench.importers.recording.arranging import CameraPose, arrangement_of, staying
 from apo_bench.importers.recording.averaging import per_axis
 from apo_bench.importers.recording.camera_file import CameraFile
@@ -120,7 +120,7 @@ def import_recording(
 
 
 def _never_rests(part: str, track: PoseTrack, assembly: Assembly) -> str:
-    still = [turned_alike(assembly.solids[part], T, track.T[0]) for T in track.T]
+    still = [turn_alike(assembly.solids[part], T, track.T[0]) for T in track.T]
     spins = ""
     if rests_of(PoseTrack(track.t, np.array(still))):
         spins = " but for a turn about its axis of revolution, which the tracker is to hold"

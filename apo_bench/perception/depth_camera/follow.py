@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
+from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turn_alike
 from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.perception.depth_camera.rays import RayCaster
@@ -93,7 +93,7 @@ def follow_demonstration(
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = turned_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
+            T = turn_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
             located = LocatedModel(T, _turn_covariance(located, T), located.explained)

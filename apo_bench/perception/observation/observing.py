@@ -55,7 +55,7 @@ def observe(
 def _complaint(demonstration: Demonstration, seen: Any) -> str:
     """What is wrong with what a noise model returned; empty if nothing is."""
     if not isinstance(seen, Observation):
-        return f"returned {type(seen).__name__}; return an apo_bench.assembly.goals.Observation"
+        return f"returned {type(seen).__name__}; return an apo_bench.assembly.Observation"
     if seen.assembly is not demonstration.assembly:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
     if set(seen.start) != set(demonstration.start):

@@ -17,7 +17,7 @@ from apo_bench.records import check
 
 @final
 class Reobservations:
-    """A `apo_bench.assembly.look.Look`: it knows the demonstration, and hands out nothing but observations.
+    """A `apo_bench.assembly.Reobserver`: it knows the demonstration, and hands out nothing but observations.
 
     Each look draws all operations, so that what is seen of one does not depend on which were asked for.
     """

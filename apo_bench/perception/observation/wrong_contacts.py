@@ -23,9 +23,9 @@ from apo_bench.assembly import (
     PartFace,
     Poses,
     contact_kind,
+    faces_oppose,
     height,
     measure_round,
-    opposed,
     placements,
     relation_graph,
     round_pairs,
@@ -202,7 +202,7 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
 
 def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
     """How far face a stands in front of face b, [m]; None if they do not look at each other, or touch."""
-    if not opposed(a, T_a, b, T_b, _OPPOSED_RAD):
+    if not faces_oppose(a, T_a, b, T_b, _OPPOSED_RAD):
         return None
     apart = height(a, T_a, b, T_b)
     return apart if apart > TOUCHING_M else None

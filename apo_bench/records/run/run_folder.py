@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any, Self, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, each_line, is_there, open_to_append, put_back
+from apo_bench.io import check_target, each_line, open_to_append
 from apo_bench.records.record import Key, TrialRecord, record_key
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import row_of, unwritable
@@ -34,7 +34,6 @@ class RunFolder:
             InputError: The folder cannot be written, is being written, or holds trials of another sweep.
         """
         self.folder = folder
-        self._run = run
         self.finished: dict[Key, str] = {}
         """The trials that have a row, and its `config_hash`."""
         try:
@@ -48,7 +47,6 @@ class RunFolder:
                 self._read(run)
                 write_run(folder, run)
                 self._timing: IO[bytes] = open_to_append(folder / "timing.jsonl")
-                self._size = os.fstat(self._trials.fileno()).st_size
             except BaseException:
                 self._trials.close()
                 raise
@@ -76,9 +74,8 @@ class RunFolder:
             raise RuntimeError(
                 f"a row was made that is none ({wrong}); the {len(self.finished)} before it are kept in {self.folder}."
             )
-        self._keep()
         try:
-            self._size += _append(self._trials.fileno(), row)
+            _append(self._trials.fileno(), row)
         except OSError as error:
             raise RuntimeError(
                 f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
@@ -90,31 +87,7 @@ class RunFolder:
 
     def rows(self) -> list[TrialRecord]:
         """All rows of the folder."""
-        self._keep()
         return read_rows(self._place)
-
-    def _keep(self) -> None:
-        """Put the files back where they were if somebody has removed them.
-
-        Raises:
-            RuntimeError: They cannot be, or rows were taken out of them.
-        """
-        lost = f"the rows of this sweep were removed from '{self.folder}' by somebody else, and"
-        if os.fstat(self._trials.fileno()).st_size < self._size:
-            raise RuntimeError(f"{lost} are lost; the same command runs their trials again.")
-        if is_there(self._trials, self._place / "trials.jsonl"):
-            return
-        try:
-            trials = put_back(self._trials, self._place / "trials.jsonl")
-            self._trials.close()
-            self._trials = trials
-            _lock(trials.fileno(), self.folder)
-            timing = put_back(self._timing, self._place / "timing.jsonl")
-            self._timing.close()
-            self._timing = timing
-            write_run(self._place, self._run)
-        except (OSError, InputError) as error:
-            raise RuntimeError(f"{lost} cannot be put back ({error}); the same command runs them.") from error
 
     def _read(self, run: Mapping[str, Any]) -> None:
         for row in each_row(self.folder):
@@ -159,9 +132,9 @@ def _lock(file: int, folder: Path) -> None:
         return
 
 
-def _append(file: int, line: Mapping[str, Any]) -> int:
-    """Add a line whole, or not at all; how many bytes it has."""
-    whole = left = json.dumps(line, allow_nan=False).encode() + b"\n"
+def _append(file: int, line: Mapping[str, Any]) -> None:
+    """Add a line whole, or not at all."""
+    left = json.dumps(line, allow_nan=False).encode() + b"\n"
     before = os.fstat(file).st_size
     try:
         while left:
@@ -170,7 +143,6 @@ def _append(file: int, line: Mapping[str, Any]) -> int:
         with suppress(OSError):
             os.ftruncate(file, before)
         raise
-    return len(whole)
 
 
 def _set_torn_line_aside(path: Path) -> None:

@@ -12,16 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import InputError
-from apo_bench.io import (
-    CONTROL,
-    HALF_BUT_OF_FILES,
-    HALF_LETTER,
-    WHOLE_LETTERS,
-    clean,
-    half_letter,
-    is_whole,
-    read_whole,
-)
+from apo_bench.io import CONTROL, clean
 from apo_bench.records.record import KEY, RECORD_FIELDS, REQUIRED, TrialRecord
 from apo_bench.records.settings import RECORD_SCHEMA, Name
 
@@ -143,7 +134,7 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
         InputError: It is no such document.
     """
     try:
-        run = _parsed(_RUN, text, file, HALF_BUT_OF_FILES)
+        run = _RUN.decode(text)
         msgspec.convert(run, _KNOWN)
         for name, value in run.items():
             _check_value(value, file, name)
@@ -168,8 +159,7 @@ def unwritable(row: Mapping[str, Any]) -> str:
     """Why a row may not be written, since it could not be read again; empty if it may."""
     try:
         msgspec.convert(dict(row), _WRITTEN)
-        half = half_letter(dict(row), HALF_LETTER)
-        fault = _fault(row) if half is None else (half, WHOLE_LETTERS)
+        fault = _fault(row)
     except msgspec.ValidationError as error:
         fault = _in_words(error)
     return "" if fault is None else f"field {fault[0]}: {fault[1]}"
@@ -180,17 +170,9 @@ _UNREADABLE = (msgspec.DecodeError, msgspec.ValidationError, RecursionError, Val
 
 def _decoded(decoder: Any, line: bytes, where: str, none: str) -> dict[str, Any]:
     try:
-        return msgspec.structs.asdict(_parsed(decoder, line, where, HALF_LETTER))
+        return msgspec.structs.asdict(decoder.decode(line))
     except _UNREADABLE as error:
         _refuse(error, where, none)
-
-
-def _parsed(decoder: Any, text: bytes, where: str, half: re.Pattern[str]) -> Any:
-    """What is wrong with a field is said first, then what is seen only when looking closer, which few lines need."""
-    document = None if b"\\" in text else decoder.decode(text)
-    if document is not None and is_whole(text):
-        return document
-    return msgspec.convert(read_whole(text, where, half), decoder.type)
 
 
 def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -1,12 +1,6 @@
-"""What an arm can do at the table, in numbers: reach, errors of its tip, stiffness, gripper, room along a plan.
+"""Check what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
 
-Where a base or the site could stand so that an arm reaches a whole scenario.
-"""
-
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -15,12 +9,13 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.plan_check import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.kinematics import Kinematics, tip_down, with_home
+from apo_bench.simulation.arms.home import tip_down
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution import key_angles, moves
-from apo_bench.simulation.robot import Halt, Robot, shifted, smooth, steady, turn_from
+from apo_bench.simulation.robot import ExecutionAborted, Robot, shifted, smooth, steady, turn_from
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
@@ -192,7 +187,7 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
             rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
             before = _pushed(robot, np.zeros(3))
             x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
-    except Halt:
+    except ExecutionAborted:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
 
@@ -223,38 +218,3 @@ def _margins(scene: Scene, plan: Plan) -> Array:
             return np.full(len(least), np.nan)
         least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in angles.reached], axis=0))
     return np.degrees(least)
-
-
-_BASES_M = tuple(product((0.0, 0.1, 0.2), (-0.45, -0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1)))
-"""Height and place behind the middle of the table."""
-_NEARER_M = (0.04, 0.08, 0.12)
-_NARROWER = 0.5
-"""How much nearer to the arm the site may be, which then is narrower."""
-
-
-def place_in_reach(scene: Scene, reaches: Callable[[Scene], bool]) -> str:
-    """What to state so that all is in reach, for the file of the arm or of the scenario; empty where nothing is found.
-
-    Args:
-        reaches: Whether the arm of a scene reaches its scenario.
-    """
-    return next((text for text, nearer in _places(scene) if reaches(nearer)), "")
-
-
-def _places(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """The arm elsewhere, then the site nearer to where it is."""
-    for z, x in _BASES_M if scene.arm.hand is not None else ():
-        with suppress(InputError):
-            arm = with_home(replace(scene.arm, base=(x, 0.0, z)), base_is_stated=True)
-            home = ", ".join(f"{angle:.1f}" for angle in np.degrees(arm.home))
-            text = f"base = {{ at_mm = [{1e3 * x:g}, 0, {1e3 * z:g}] }} and home_deg = [{home}]"
-            moved = replace(scene, arm=arm, kinematics=Kinematics(arm))
-            yield f"all is in reach with {text} in the file of the arm", moved
-    site = scene.scenario.site
-    for by in _NEARER_M:
-        x, y = site.center_m
-        spread = (_NARROWER * site.spread_m[0], _NARROWER * site.spread_m[1])
-        nearer = replace(site, center_m=(x - by, y), spread_m=spread)
-        numbers = ", ".join(f"{1e3 * v:g}" for v in nearer.center_m), ", ".join(f"{1e3 * v:g}" for v in spread)
-        text = f"site: all is in reach with center_mm = [{numbers[0]}], spread_mm = [{numbers[1]}]"
-        yield text, replace(scene, scenario=replace(scene.scenario, site=nearer))

@@ -11,13 +11,16 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
+from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.kinematics import with_home
-from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model, stated_arm
-from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
+from apo_bench.simulation.arms.grooves import fill_grooves
+from apo_bench.simulation.arms.home import with_home
+from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
+from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.stated import stated_arm
 from apo_bench.simulation.arms.strength import with_force
 from apo_bench.simulation.physics import without_log_file
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.arm import ArmDescription
-from apo_bench.simulation.arms.rig import geom_reach
+from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.shapes import geom_reach
 from apo_bench.simulation.frames import frame, rotation
 
 _USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment", "pinch_site")
@@ -101,12 +101,12 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
         require(
             sorted(description.joints) == sorted(names),
             f"{description.file}: 'joints' are {', '.join(description.joints)}; between base and flange lie "
-            f"{', '.join(names) or 'uncorrected'}.",
+            f"{', '.join(names) or 'none'}.",
         )
         names = [name for name in names if name in description.joints]
     require(
         _LEAST_JOINTS <= len(names) <= _MOST_JOINTS,
-        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'uncorrected'}); "
+        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
         f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'.",
     )
     return names

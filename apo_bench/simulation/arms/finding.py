@@ -15,8 +15,9 @@ from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 from apo_bench.names import resolve
 from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
-from apo_bench.simulation.arms.arm import Arm, ArmDescription, GripperDescription
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_arm, read_described
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.loading import load_model
 
 _MENAGERIE = "APO_BENCH_MENAGERIE"

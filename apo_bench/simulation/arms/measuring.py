@@ -1,17 +1,11 @@
-"""What a gripper does, found by driving it: which surfaces hold, how far they open, how hard they push.
+"""Measure a gripper by driving it: which surfaces hold, how far they open, how hard they push.
 
-Nothing but the drive is simulated: no gravity, the arm stands still. Fingers are what moves; they close along the
-direction in which two groups of them move towards each other. Of each group, what reaches farthest are the pads.
-
-Grooves between the boxes of a fingertip, filled.
-
-A round part that comes to lie in a groove between two boxes is pushed on by MuJoCo along the sides of the groove, where
-it overlaps them least, and not away from the pad: it is wedged, and opening fingers take it along (the hand of the
-Panda in Menagerie, four boxes of 6 mm with 4 and 5 mm between them: 7 N).
+Only the drive is simulated: no gravity, the arm stands still. Fingers are what moves; they close along the direction in
+which two groups of them move towards each other. The pads of a group are what reaches farthest.
 """
 
 from collections.abc import Sequence
-from itertools import permutations, product
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,9 +14,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.simulation.arms.arm import GripperDescription, Hand
+from apo_bench.simulation.arms.arm import Hand
+from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.pads import pads_of
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import LONGEST_S, Rig, below, command_ends, geom_reach, pads_of, rig_of
+from apo_bench.simulation.arms.rig import LONGEST_S, Rig, command_ends, rig_of
+from apo_bench.simulation.arms.shapes import below, geom_reach
 from apo_bench.simulation.frames import frame
 
 _LEVELS = 17
@@ -201,41 +198,3 @@ def _mount(model: Any, pads: Sequence[int], flange: int) -> int:
             break
         mount = parent
     return mount
-
-
-_GROOVE_M = 0.008
-_SAME_M = 1e-5
-"""Wider than the first is no groove; boxes whose ends differ by less than the second end alike."""
-
-
-def fill_grooves(spec: Any, joints: Sequence[str]) -> None:
-    """Make one box of two of the same finger that are alike but for their places along one axis.
-
-    Args:
-        joints: Of the arm; bodies that turn by them are no fingers.
-    """
-    for body in spec.bodies[1:]:
-        moved = [joint.name for joint in body.joints]
-        if moved and not set(moved) & set(joints):
-            while _fill_one(spec, body):
-                pass
-
-
-def _fill_one(spec: Any, body: Any) -> bool:
-    boxes = [geom for geom in body.geoms if geom.type == mujoco.mjtGeom.mjGEOM_BOX and geom.contype]
-    for one, other in permutations(boxes, 2):
-        # Ends along the axes of the boxes, which are those of the finger.
-        if not (_upright(one) and _upright(other)):
-            continue
-        low, high = one.pos - one.size, one.pos + one.size
-        far, end = other.pos - other.size, other.pos + other.size
-        differ = np.flatnonzero((np.abs(low - far) > _SAME_M) | (np.abs(high - end) > _SAME_M))
-        if len(differ) == 1 and _SAME_M < (far - high)[differ[0]] < _GROOVE_M:
-            one.pos, one.size = (low + end) / 2, (end - low) / 2
-            spec.delete(other)
-            return True
-    return False
-
-
-def _upright(geom: Any) -> bool:
-    return bool(abs(geom.quat[0]) > 1.0 - _SAME_M)

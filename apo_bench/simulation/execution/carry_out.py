@@ -15,7 +15,17 @@ from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, grasp_again, release
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot import Guard, Halt, Robot, Trajectory, paced, shifted, smooth, steady, with_height
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Guard,
+    Robot,
+    Trajectory,
+    paced,
+    shifted,
+    smooth,
+    steady,
+    with_height,
+)
 
 _LIFT = (0.4, 0.25)
 _CARRY = (0.5, 0.35)
@@ -41,7 +51,7 @@ _THROUGH = 0.15
 """Steady speed [m/s] where only walls are that the part is between already."""
 _BEFORE_M = 0.008
 _BEHIND_M = 0.004
-"""A mouth may be so much nearer or farther than it is believed to be."""
+"""A mouth may be so much nearer or farther than it is estimated to be."""
 _BEYOND_M = 0.004
 _OFF_M = 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
@@ -49,14 +59,14 @@ _LOOSE_M = 0.00005
 """Faces this far apart touch for the judge, and do not rub."""
 
 
-def take(robot: Robot, t: Transfer, again: bool = False) -> int:
+def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
     """Pick the part and lift it; returns which of its grips is then in use.
 
     Args:
         again: Whether it is squared and grasped twice.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; the stage and code say what.
     """
     for other in t.squaring:
         robot.stage = "pick"
@@ -76,14 +86,14 @@ def take(robot: Robot, t: Transfer, again: bool = False) -> int:
     return in_use
 
 
-def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
+def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
     """Carry the part that is held by its i-th grip, attach it, let go and depart.
 
     Args:
         lay: Lays it flat first, before a level insertion below where that begins, and says how it is held then.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; the stage and code say what.
     """
     grip, second = before_attach(robot, t, i, lay)
     robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
@@ -100,7 +110,7 @@ def before_attach(
         lay: As in `bring`.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; the stage and code say what.
     """
     grip = t.grips[i]
     if lay is not None and not t.into.level:
@@ -119,7 +129,7 @@ def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_f
         T_found: What brings the poses that were meant to those that were found, (4, 4), world.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; the stage and code say what.
     """
     left = 0.0
     rise = t.floats
@@ -158,10 +168,12 @@ def pace(t: Transfer, second: Grip | None) -> Pace:
     bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
     if not t.into.level:
         return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
-    mouths = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.mouths)
+    entrances = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.entrances)
     if second is not None and t.into.left is not None:
-        return Pace(_THROUGH, mouths, t.into.left)
-    return Pace(_THROUGH, (*mouths, (_BOTTOM_M, -math.inf, _TOUCH)) if bottom else mouths, -_OVERTRAVEL_M * bottom)
+        return Pace(_THROUGH, entrances, t.into.left)
+    if not bottom:
+        return Pace(_THROUGH, entrances, 0.0)
+    return Pace(_THROUGH, (*entrances, (_BOTTOM_M, -math.inf, _TOUCH)), -_OVERTRAVEL_M)
 
 
 def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
@@ -169,7 +181,7 @@ def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:
-        raise Halt("attach", "force_stop")
+        raise ExecutionAborted("attach", "force_stop")
     for other in t.centring:
         robot.stage = "release"
         centre(robot, t, other, t.T_world_goal)
@@ -186,10 +198,10 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
-    robot.hold_watch = robot.hold_watch.carry(robot.in_hand())
+    robot.slip_monitor = robot.slip_monitor.carry(robot.in_hand())
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:
-        raise Halt("carry", "lost_grasp", " or ".join(t.carried))
+        raise ExecutionAborted("carry", "lost_grasp", " or ".join(t.carried))
 
 
 def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
@@ -266,7 +278,7 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
 def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
     """On to `left` [m] before the goal, slowly where a mouth may be."""
     far = float(np.linalg.norm(end[:3, 3] - robot.T[:3, 3]))
-    at = [far + left - mouth for mouth in t.mouths]
+    at = [far + left - mouth for mouth in t.entrances]
     return paced(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 

@@ -71,7 +71,7 @@ class Grips(NamedTuple):
 
 
 def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
-    """Every part but these, where it is believed to be."""
+    """Every part but these, where it is estimated to be."""
     return tuple(obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
 
 

@@ -15,7 +15,7 @@ from apo_bench.assembly import Poses, ReplayResult, Snapshot, Step
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot import Robot
-from apo_bench.simulation.scene import awaken
+from apo_bench.simulation.scene import wake
 
 _MOST = 4096
 """States, and results, that are kept, 5 kB each; the oldest go first."""
@@ -43,23 +43,23 @@ class SavedState(NamedTuple):
     progress: Progress
 
 
-def saved_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
+def save_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
     """The present state; nothing sleeps in it, nor now."""
     model = robot.model
     data = robot.data
-    awaken(robot.scene.work, data)
+    wake(robot.scene.work, data)
     state = np.zeros(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
     reached = Progress([*progress.after], [*progress.timeline])
     return SavedState(state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, reached)
 
 
-def take_up(saved: SavedState, robot: Robot) -> None:
+def restore_state(saved: SavedState, robot: Robot) -> None:
     """Bring a robot, and all around it, to a state that was saved."""
     robot.model.eq_data[:] = saved.welds
     mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
     robot.data.sensordata[:] = saved.sensors
-    awaken(robot.scene.work, robot.data)
+    wake(robot.scene.work, robot.data)
     robot.remember(saved.robot)
 
 
@@ -83,10 +83,10 @@ class ReplayCache:
     def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
         """Keep the present state under what has led to it; nothing sleeps in it."""
         if key not in self._states:
-            self._states[key] = saved_state(robot, grip, progress)
+            self._states[key] = save_state(robot, grip, progress)
             _drop_oldest(self._states)
         else:
-            awaken(robot.scene.work, robot.data)
+            wake(robot.scene.work, robot.data)
 
     def resume(self, keys: Sequence[bytes], robot: Robot, progress: Progress) -> tuple[int, int]:
         """Take up the furthest state that was kept.
@@ -97,7 +97,7 @@ class ReplayCache:
         for i in range(len(keys), 0, -1):
             saved = self._states.get(keys[i - 1])
             if saved is not None:
-                take_up(saved, robot)
+                restore_state(saved, robot)
                 progress.after[:] = saved.progress.after
                 progress.timeline[:] = saved.progress.timeline
                 return i, saved.grip

@@ -91,7 +91,7 @@ class Transfer:
     """Height of the tip at which the part is carried over everything that stands, [m]."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
-    mouths: tuple[float, ...]
+    entrances: tuple[float, ...]
     """So far before the goal the part comes to where walls begin that it goes between, [m]."""
     weight_n: float
     """The weight of the part and what it carries, [N]."""
@@ -108,11 +108,11 @@ class Transfer:
     that comes half of the way of all."""
     squaring: tuple[Grip, ...] = ()
     """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
-    flush: Any = None
-    """A `Flush`: the part laid flat, below where a level insertion begins, or where it stood before one from above;
-    None where it cannot or need not."""
-    beside: tuple[Any, ...] = ()
-    """Each a `Beside`: where the part touches a wall with its side, before an insertion from above."""
+    flat: Any = None
+    """A `FlatPlacement`: the part laid flat, below where a level insertion begins, or where it stood before one from
+    above; None where it cannot or need not."""
+    side_touches: tuple[Any, ...] = ()
+    """Each a `SideTouch`: where the part touches a wall with its side, before an insertion from above."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
@@ -130,7 +130,7 @@ class Transfer:
     @property
     def stuck(self) -> float:
         """A motion from above that is stopped farther than this before its end has not found its hole, [m]."""
-        return min(self.mouths) / 2 if self.in_last and self.mouths else self.depth / 2
+        return min(self.entrances) / 2 if self.in_last and self.entrances else self.depth / 2
 
     @property
     def sides(self) -> tuple[Array, ...]:
@@ -205,7 +205,7 @@ def arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
 
 
 def motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The macros in the world, for a part that arrives at T; slides as they are believed to be."""
+    """The macros in the world, for a part that arrives at T; slides as they are estimated to be."""
     straight = [macro for macro in arrival.macros if macro.name != "slide-to-contact"]
     turned = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in straight]
     return (*turned, *(Motion("slide-to-contact", side) for side in sides))

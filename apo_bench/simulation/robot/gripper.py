@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.geometry import Array, Box
 from apo_bench.simulation.arms.arm import Arm, Hand
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.arms.rig import below
+from apo_bench.simulation.arms.shapes import below
 
 _UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""

@@ -17,7 +17,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, initial_state, place
+from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
 
 _Image = NDArray[np.uint8]
 SceneCamera: TypeAlias = str | mujoco.MjvCamera
@@ -245,7 +245,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
     data = initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
-        place(world, data, part, poses.get(part, scene.scenario.start[part]))
+        set_part_pose(world, data, part, poses.get(part, scene.scenario.start[part]))
     data.mocap_pos[:, 2] = -1.0
     mujoco.mj_forward(world.model, data)
     return data

@@ -20,12 +20,12 @@ from apo_bench.simulation.execution import (
     end_of_attach,
     pace,
     release,
-    take_up,
-    until_rest,
+    restore_state,
+    wait_for_rest,
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, shifted
-from apo_bench.simulation.scene import Scene, part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.scene import Scene, allow_sleep, part_pose, snapshot, wrist_sensors_on
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -61,7 +61,7 @@ class Feel(NamedTuple):
     """What the robot knows after an action, in the frame of the way in; the third axis leads in."""
 
     tip: Array
-    """(6,), measured less where the line ends, [m, rad]: of the believed front of the part, and its turn."""
+    """(6,), measured less where the line ends, [m, rad]: of the estimated front of the part, and its turn."""
     lag: Array
     """(6,), commanded less measured, [m, rad]."""
     opening: float
@@ -87,7 +87,7 @@ class TipControl:
         """Whether the approach is over and would let go."""
         self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
         robot.compensate(start.off)
-        take_up(start.saved, robot)
+        restore_state(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
@@ -120,7 +120,7 @@ class TipControl:
             turn: (3,), a rotation vector about the front in that frame, [rad].
 
         Raises:
-            Halt: Something was struck, or fell out of the hand.
+            ExecutionAborted: Something was struck, or fell out of the hand.
         """
         with self._stepping():
             self._move(shift, turn)
@@ -131,12 +131,12 @@ class TipControl:
         """Open the fingers, do what the operation still has after an approach that arrived, and wait until parts rest.
 
         Raises:
-            Halt: Something went wrong; what was reached then is never judged.
+            ExecutionAborted: Something went wrong; what was reached then is never judged.
         """
         robot = self.robot
         t = self.start.transfer
         work = robot.scene.work
-        with sleeping(work, robot.scene.grasp == "friction"), robot.watch_stability():
+        with allow_sleep(work, robot.scene.grasp == "friction"), robot.watch_stability():
             robot.stand()
             if self.arrived:
                 at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
@@ -144,7 +144,7 @@ class TipControl:
             else:
                 release(robot, t, self.start.grip)
                 depart(robot, t)
-            until_rest(robot)
+            wait_for_rest(robot)
             return snapshot(work, robot.data, self.start.parts)
 
     def sigmas(self, covariance: Array) -> Array:
@@ -192,8 +192,8 @@ class TipControl:
     def _stepping(self) -> Iterator[None]:
         robot = self.robot
         work = robot.scene.work
-        asleep = sleeping(work, robot.scene.grasp == "friction")
-        with asleep, wrist_felt(work.model), robot.watch_stability():
+        asleep = allow_sleep(work, robot.scene.grasp == "friction")
+        with asleep, wrist_sensors_on(work.model), robot.watch_stability():
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:
@@ -239,7 +239,7 @@ class TipControl:
             leads = turning + shifting @ led
             q = q + dt * (leads + shifting @ yields)
             self._passed += 1
-            self._force = robot.nudge(q, self._passed, leads)
+            self._force = robot.servo_step(q, self._passed, leads)
             self._wrist.take(dt)
         self._at = from_there + moved @ self._R
         robot.q = q

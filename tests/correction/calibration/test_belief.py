@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import InputError
-from apo_bench.correction.calibration import UNKNOWN, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, prior_estimate, slip_sigmas
 from apo_bench.geometry import pose
 from apo_bench.records.robot_error import Sigmas
 
@@ -46,10 +46,10 @@ def around() -> list[tuple[float, float]]:
     return [(0.6, 0.1), (0.42, 0.18), (0.43, 0.0)]
 
 
-def taught(seed: int = 0) -> RobotBelief:
+def taught(seed: int = 0) -> RobotEstimate:
     """A belief of which every unknown is other than zero."""
     rng = np.random.default_rng(seed)
-    belief = believe(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
+    belief = prior_estimate(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
     for _ in range(12):
         n = rng.standard_normal(3)
         n /= np.linalg.norm(n)
@@ -72,7 +72,7 @@ def test_what_is_commanded_really_comes_to_be() -> None:
 
 
 def test_without_touches_nothing_moves() -> None:
-    belief = believe(UNKNOWN, 6, MIDDLE).grasp(0, slip_sigmas(UNKNOWN))
+    belief = prior_estimate(UNKNOWN, 6, MIDDLE).grasp(0, slip_sigmas(UNKNOWN))
     assert_array_equal(belief.touch().mean, belief.mean)
     assert_allclose(belief.real(DOWN, jacobian()), DOWN, atol=1e-16)
     assert_allclose(belief.goal_tip(DOWN @ HELD, 0, HELD), DOWN, atol=1e-15)
@@ -84,7 +84,7 @@ def test_without_touches_nothing_moves() -> None:
 def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
     xi = np.array([0.8e-3, -1.1e-3, 1.7e-3, 4e-3, -6e-3, 3e-3])
     E = displaced(xi)
-    belief = believe(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
+    belief = prior_estimate(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
     # the plane as felt: what lies in it comes to where it really is in height, wherever
     for at in [(0.5, 0.1), (0.3, -0.2)]:
         B = pose.at((*at, 0.0), (180.0, 0.0, 0.0))
@@ -100,7 +100,7 @@ def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
 
 def test_laying_flush_tells_height_and_tilts_in_the_hand_alone() -> None:
     gamma = np.array([0.4e-3, -0.7e-3, 0.9e-3, 0.01, -0.006, 0.012])
-    belief = believe(Sigmas(), 0, MIDDLE).grasp(1, FREE)
+    belief = prior_estimate(Sigmas(), 0, MIDDLE).grasp(1, FREE)
     held = pose.at((0.0, 0.0, 0.02))
     lying = pose.exp(gamma) @ held
     # the hand is turned until the bottom of the part is level, its lowest face at z = 0
@@ -122,7 +122,7 @@ def test_laying_flush_tells_height_and_tilts_in_the_hand_alone() -> None:
 def test_the_order_of_touches_does_not_matter() -> None:
     E = displaced(np.array([0.3e-3, 0.5e-3, -0.9e-3, 2e-3, 3e-3, -1e-3]))
     touches = [touch_of(E, at, 5e-5) for at in around()] + [touch_of(E, (0.5, 0.1), 5e-5, off_m=3e-3)]
-    prior = believe(UNKNOWN, 6, MIDDLE)
+    prior = prior_estimate(UNKNOWN, 6, MIDDLE)
     first = prior.touch(*touches)
     assert [one.offset for one in first.refused] == [touches[3].offset]
     for order in permutations(touches):
@@ -138,12 +138,12 @@ def test_the_order_of_touches_does_not_matter() -> None:
 def test_the_same_touch_again_halves_the_variance() -> None:
     vague = Sigmas(hand_eye=(20.0, 0.0))
     touch = touch_of(np.eye(4), (0.5, 0.1), 1e-5)
-    variances = [believe(vague, 0, MIDDLE).touch(*n * [touch]).covariance[2, 2] for n in (1, 2, 4)]
+    variances = [prior_estimate(vague, 0, MIDDLE).touch(*n * [touch]).covariance[2, 2] for n in (1, 2, 4)]
     assert_allclose(variances, np.array([1.0, 0.5, 0.25]) * 1e-10, rtol=1e-5)
 
 
 def test_what_is_known_exactly_stays_so() -> None:
-    belief = believe(ONLY_HAND_EYE, 6, MIDDLE).grasp(0, slip_sigmas(Sigmas(in_hand=(0.5, 1.0))))
+    belief = prior_estimate(ONLY_HAND_EYE, 6, MIDDLE).grasp(0, slip_sigmas(Sigmas(in_hand=(0.5, 1.0))))
     lying = [Touch(DOWN, UP, 0.3005, v, 1e-5, jacobian(), 0, HELD) for v in CORNERS]
     belief = belief.touch(*lying)
     exact = [*range(6, 15), 15, 19, 20]
@@ -163,7 +163,7 @@ def test_a_grasp_made_anew_forgets_the_part_and_keeps_the_robot() -> None:
 
 def test_a_shared_error_cancels_between_places() -> None:
     """Two places of one part at one turn: hand-eye shift and tool are the same there."""
-    belief = believe(Sigmas(hand_eye=(1.0, 0.0), tool_mm=0.5), 0, MIDDLE)
+    belief = prior_estimate(Sigmas(hand_eye=(1.0, 0.0), tool_mm=0.5), 0, MIDDLE)
     there = pose.at((0.1, 0.0, 0.0)) @ DOWN
     apart = belief.jacobian_of(DOWN) - belief.jacobian_of(there)
     assert_allclose(apart @ belief.covariance @ apart.T, 0.0, atol=1e-18)
@@ -174,7 +174,7 @@ def test_joints_are_told_through_the_jacobian() -> None:
     """Touches of a robot whose encoders alone are off: with its Jacobians the touched heights are explained."""
     rng = np.random.default_rng(4)
     delta = np.radians(0.05) * rng.standard_normal(6)
-    prior = believe(Sigmas(joints_deg=0.05), 6, MIDDLE)
+    prior = prior_estimate(Sigmas(joints_deg=0.05), 6, MIDDLE)
     touches = []
     for seed in range(8):
         B = pose.at(MIDDLE + rng.uniform(-0.2, 0.2, 3), (180.0, 0.0, rng.uniform(-180.0, 180.0)))
@@ -194,7 +194,7 @@ def test_a_belief_survives_pickling() -> None:
 
 
 def test_wrong_requests_get_one_sentence() -> None:
-    belief = believe(UNKNOWN, 6, MIDDLE)
+    belief = prior_estimate(UNKNOWN, 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 2 was given; grasps so far: none; call"):
         belief.held(2, HELD)
     with pytest.raises(InputError, match=r"the Jacobian cannot be used: an array of shape \(6, 6\) is needed"):
@@ -206,17 +206,17 @@ def test_wrong_requests_get_one_sentence() -> None:
     with pytest.raises(InputError, match=r"standard deviations cannot be used: an array of shape \(6\) is needed"):
         belief.grasp(0, np.zeros(3))
     with pytest.raises(InputError, match="-1 joints were given"):
-        believe(UNKNOWN, -1, MIDDLE)
+        prior_estimate(UNKNOWN, -1, MIDDLE)
     with pytest.raises(InputError, match=r"1\.5 joints were given"):
-        believe(UNKNOWN, 1.5, MIDDLE)  # type: ignore[arg-type]
+        prior_estimate(UNKNOWN, 1.5, MIDDLE)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a str was given as sigmas; give UNSTATED, or"):
-        believe("unknown", 6, MIDDLE)  # type: ignore[arg-type]
+        prior_estimate("unknown", 6, MIDDLE)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a list was given as a touch; give each as a Touch"):
         belief.touch([])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the middle cannot be used: every number must be finite"):
-        believe(UNKNOWN, 6, np.full(3, np.nan))
+        prior_estimate(UNKNOWN, 6, np.full(3, np.nan))
     with pytest.raises(InputError, match="the standard deviations cannot be used"):
-        believe(Sigmas(hand_eye=(np.nan, 0.0)), 6, MIDDLE)
+        prior_estimate(Sigmas(hand_eye=(np.nan, 0.0)), 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 0 was given"):
         belief.touch(Touch(DOWN, UP, 0.0, np.zeros(3), 1e-5, None, 0, HELD))
     with pytest.raises(InputError, match="the Jacobian cannot be used"):

@@ -15,7 +15,7 @@ from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.contact import MOST_SUSPECTS
 from apo_bench.geometry import Face, pose
-from benchmarks.corrector_bench.problems import problem
+from benchmarks.corrector_problems import problem
 from tests import scenes
 from tests.correction.solvers.test_large import fence
 
@@ -183,7 +183,7 @@ def test_two_wrong_relations_are_left_out_one_after_the_other() -> None:
 def test_four_wrong_relations_are_too_many_to_leave_out() -> None:
     off = {f"stick{k}.py on castle{k}.spy": 10.0 for k in range(5)}
     given = problem("chain6")
-    seen = look(scenes.Scene(given.assembly, given.start, given.goals), 0, off)
+    seen = look(scenes.Scene(given.assembly, given.start, given.poses), 0, off)
     made = ContactCorrector("drop")(seen)
     assert len(made.dropped) == 3
     assert made.status == "inconsistent"

@@ -6,6 +6,7 @@ from math import comb
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.correction.robust.test_looks import Again, at_the_same_place
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, placements
@@ -32,7 +33,6 @@ from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.trial.outcome_columns import goal_errors
-from tests.correction.robust.test_looks import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
 TOWER = "stick_in_tower"
@@ -108,7 +108,7 @@ def test_two_looks_that_repeat_an_error_are_no_proof():
     again = seen_at(second, k, wrong.poses[k] @ pose.exp(np.repeat([3e-4, 3e-3], 3)))
     for repeat, believed in ((0.8, False), (0.2, False)):
         model = OutlierModel(repeat=repeat)
-        found = correct(replace(wrong, outliers=model), look=Again(again))
+        found = correct(replace(wrong, outliers=model), reobserve=Again(again))
         assert found.ok
         assert (k not in found.left_out) == believed
         assert found.dropped == ()
@@ -176,7 +176,7 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     looks = Reobservations(
         first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1])
     )
-    assert correct(seen, look=looks).ok
+    assert correct(seen, reobserve=looks).ok
     assert counts
     assert max(counts) < 300
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, largest_gap, looking_away, placements
+from apo_bench.assembly import OutlierModel, faces_away, largest_gap, placements
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.inferred import inferred_goals
@@ -87,7 +87,7 @@ def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
             found = correct(observation, "contact-robust")
             assert found.ok
             assert largest_gap(scenario.assembly, observation.start, found.poses) <= observation.gap_m
-            assert not looking_away(scenario.assembly, observation.start, found.poses).any()
+            assert not faces_away(scenario.assembly, observation.start, found.poses).any()
             all_of_them += 1
             right += found.left_out == (k,) and f"; left out what was seen of operation {k + 1}" in found.sentence
     assert right >= all_of_them - 1
@@ -113,7 +113,7 @@ def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one
     assert inferred.baseless == ()
     observation = replace(exact, poses=inferred.goals)
     assert largest_gap(scenario.assembly, layout.start, observation.poses) < 2e-3
-    assert not looking_away(scenario.assembly, layout.start, observation.poses).any()
+    assert not faces_away(scenario.assembly, layout.start, observation.poses).any()
 
 
 def test_planes_that_are_parallel_but_for_noise_do_not_say_where_they_meet():
@@ -148,7 +148,7 @@ def test_a_single_operation_that_was_seen_turned_is_turned_back():
     assert found.ok
     assert found.dropped == ()
     assert "seen turned: operation 1" in found.sentence
-    assert not looking_away(single, made.start, found.poses).any()
+    assert not faces_away(single, made.start, found.poses).any()
 
 
 def test_ten_times_the_noise_is_seen_badly_and_not_left_out():

@@ -103,7 +103,7 @@ SKEWED[1, 0, 1] = 1e-7
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.goals.Observation"),
+        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.Observation"),
         (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
         (replace(GOOD, start={}), "changed which parts have a start pose"),
         (replace(GOOD, poses=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),

@@ -8,10 +8,8 @@ from apo_bench.perception.observation.models.failures import CameraFailures
 from apo_bench.perception.observation.models.fitted import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
-    ConstantError,
     Fitted,
     MeasuredNoise,
-    ViewNoise,
 )
 from apo_bench.perception.observation.models.isotropic import HeavyTailed, Isotropic, PerPart
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, Outliers, last_seen
@@ -32,7 +30,6 @@ __all__ = (
     "Bias",
     "Camera",
     "CameraFailures",
-    "ConstantError",
     "Empirical",
     "Facts",
     "Fitted",
@@ -47,7 +44,6 @@ __all__ = (
     "Split",
     "Symmetric",
     "Tail",
-    "ViewNoise",
     "empirical_noise",
     "floored",
     "last_seen",

@@ -16,7 +16,7 @@ from apo_bench.geometry import (
     flat_area,
     polygons_of,
     rings_of,
-    straightened,
+    straighten,
 )
 from apo_bench.scenario.parts.making.moments import Moments, summed
 
@@ -146,7 +146,7 @@ def _plane(n: Array) -> Array:
 
 
 def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
-    flat = [straightened(ring) for ring in rings_of(polygon, sign)]
+    flat = [straighten(ring) for ring in rings_of(polygon, sign)]
     outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
     return Face(name, outline, tuple(holes), fit)
 

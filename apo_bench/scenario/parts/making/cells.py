@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Point, Polygon, box, unary_union
 
-from apo_bench.geometry import Array, polygons_of, rings_of, straightened
+from apo_bench.geometry import Array, polygons_of, rings_of, straighten
 
 _SAME_MM = 1e-6
 _ON_MM = 1e-9
@@ -30,7 +30,7 @@ def convex_cells(area: Any) -> list[Array]:
 def _cut(polygon: Any) -> list[Array]:
     from manifold3d import triangulate
 
-    rings = [straightened(ring) for ring in rings_of(polygon, 1.0)]
+    rings = [straighten(ring) for ring in rings_of(polygon, 1.0)]
     if len(rings) == 1 and is_convex(rings[0]):
         return rings
     points = np.concatenate(rings)
@@ -46,7 +46,7 @@ def _cut(polygon: Any) -> list[Array]:
             for edge in zip(joined, [*joined[1:], joined[0]], strict=True):
                 owner[edge] = i
             del cells[k]
-    return [straightened(points[cell]) for cell in cells.values() if _is_wide(points[cell])]
+    return [straighten(points[cell]) for cell in cells.values() if _is_wide(points[cell])]
 
 
 def _is_wide(ring: Array) -> bool:
@@ -87,7 +87,7 @@ def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, flo
         cell = Polygon(square).intersection(free)
         if cell.geom_type != "Polygon" or cell.interiors:
             continue
-        corners = straightened(rings_of(cell, 1.0)[0])
+        corners = straighten(rings_of(cell, 1.0)[0])
         if is_convex(corners) and cell.contains(Point(at)) and cell.exterior.distance(Point(at)) > radius + _SAME_MM:
             return corners
     return None

@@ -9,7 +9,7 @@ import numpy as np
 from shapely import Polygon, unary_union
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
+from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straighten
 from apo_bench.scenario.parts.making.body import Body
 from apo_bench.scenario.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.scenario.parts.making.frustums import (
@@ -248,6 +248,6 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
 
 def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
     """A level face from rings in mm, all counter-clockwise, that looks up or down."""
-    turned = [1e-3 * raised(straightened(each), z) for each in (outline, *holes)]
+    turned = [1e-3 * raised(straighten(each), z) for each in (outline, *holes)]
     outside, *inside = turned if up else [each[::-1] for each in turned]
     return Face(name, outside, tuple(hole[::-1] for hole in inside), fit)

@@ -1,6 +1,6 @@
 """Where the closed, empty hand can touch what is fixed: three places of the floor around the goals, and walls.
 
-Known from the plan alone: believed poses of what stands, and shapes.
+Known from the plan alone: estimated poses of what stands, and shapes.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,8 +12,9 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.simulation.execution.beside import NOISE_LEVEL, STAND_OFF_M, upright_walls
+from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M, upright_walls
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot import Obstacle, gripper_boxes, shifted
 from apo_bench.simulation.scene import Scene
