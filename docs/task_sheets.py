@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import relation_graph
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.viz.card import cards
-from apo_bench.viz.graph.drawing import draw_graph
-from apo_bench.viz.graph.text import graph_title
+from apo_bench.viz.task_sheet import cards
+from apo_bench.viz.graph_picture import draw_graph
+from apo_bench.viz.graph_text import graph_title
 from benchmarks.baselines import HEAD, describe, describe_nominal, read_counts
 
 HERE = Path(__file__).parent

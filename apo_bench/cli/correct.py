@@ -90,7 +90,10 @@ def correct_command(
         print_json(form | {"moved": moved or None, "predicted_success": predicted_success})
     else:
         print_columns([("observation", f"{observation} of {task.name}, corrected by {method}"), *lines])
-        for rows, columns in ((form["operations"], POSE_COLUMNS), (form["test"] and form["test"]["suspects"], SUSPECT_COLUMNS)):
+        for rows, columns in (
+            (form["operations"], POSE_COLUMNS),
+            (form["test"] and form["test"]["suspects"], SUSPECT_COLUMNS),
+        ):
             if rows:
                 print_table(form_table(rows, columns))
     if out is not None and correction.ok:

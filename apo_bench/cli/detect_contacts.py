@@ -25,7 +25,7 @@ from apo_bench.records import DETECTED
 def detect_contacts_command(
     scenario: ScenarioArgument,
     *,
-    observation: Annotated[Path | None, path_option("Use this observation (.csv or .json) in place of a trial.")] = None,
+    observation: Annotated[Path | None, path_option("Use this observation in place of a trial.")] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     contact_source: Annotated[str, typer.Option(help="detected, or detected-jointly.")] = "detected",

@@ -1,4 +1,4 @@
-"""The command `apo-bench inspect dof`: the directions that contacts fix and leave free; its picture needs a simulator."""
+"""The command `apo-bench inspect dof`: what contacts fix; only its picture needs a simulator."""
 
 from pathlib import Path
 from typing import Annotated
@@ -36,7 +36,7 @@ def dof_command(
       apo-bench inspect dof stick_in_tower --observation docs/seen.csv
     """
     from apo_bench import correct, explain, load_scenario
-    from apo_bench.formats.deviations import assumed_deviations
+    from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, assumed_deviations
     from apo_bench.formats.observation import as_planned, read_observation_file
     from apo_bench.viz.dof_text import (
         PART_COLUMNS,
@@ -52,7 +52,9 @@ def dof_command(
     predicted_success = None
     if observation is None:
         task, assumed = load_scenario(scenario), True
-        observed = as_planned(task, 1.0 if deviation_mm is None else deviation_mm, 1.0 if deviation_deg is None else deviation_deg)
+        mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+        deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
+        observed = as_planned(task, mm, deg)
         explanation = explain(observed, observed.poses)
     else:
         observed, task, assumed = read_observation_file(

@@ -41,7 +41,8 @@ def plan_command(
         Path | None, path_option("Base, flange and order of quaternions of --robot: .toml; default: base, tip, xyzw.")
     ] = None,
     probing: Annotated[
-        str | None, typer.Option(metavar="FT_SENSOR", help="Write also the probing motions for this sensor into --robot.")
+        str | None,
+        typer.Option(metavar="FT_SENSOR", help="Write also the probing motions for this sensor into --robot."),
     ] = None,
     arm: Annotated[str | None, typer.Option(help="Check whether this arm can execute the plan.")] = None,
     as_json: AsJson = False,
@@ -66,7 +67,7 @@ def plan_command(
     if observation is None:
         task = load_scenario(scenario)
         plan = Plan(task.assembly, task.start, task.goals)
-        where = "at the nominal poses; directions and positions in the frame of the assembly"
+        where = "at the nominal poses; directions and poses in the frame of the assembly"
     else:
         method = method or CORRECTOR
         read = read_observation_file(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
@@ -75,7 +76,7 @@ def plan_command(
             notes.append(assumed_deviations(deviation_mm, deviation_deg))
         with redirect_output(as_json):
             plan, predicted_success = _plan_observation(read, method, notes)
-        where = f"at the poses of {observation}, {method}; directions in the frame of the assembly, positions in the world"
+        where = f"at the poses of {observation}, {method}; directions in the frame of the assembly, poses in the world"
     robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if arm is not None:
         from apo_bench.simulation.arms.finding import find_arm

@@ -56,7 +56,7 @@ def poses_command(
     if not observed:
         correction = correct(seen, with_simulated(method))
         if not correction.ok:
-            raise RuntimeError(f"{method} found no correction ({correction.sentence}); draw the observation: --observed")
+            raise RuntimeError(f"{method} found no correction: {correction.sentence}; --observed needs none")
         plan = fitting_plan(correction, seen, task)
         notes = "; ".join(filter(None, (plan.sentence, plan_warning(task, plan.plan, correction))))
         panels.append(poses_panel(f"corrected by {method}", seen, plan.plan.target_poses, step, notes))

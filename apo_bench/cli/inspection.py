@@ -1,5 +1,7 @@
 """The group of commands `apo-bench inspect`: one plan, looked into."""
 
+from collections.abc import Callable, Mapping
+
 from apo_bench.cli.inspect_depth import depth_command
 from apo_bench.cli.inspect_dof import dof_command
 from apo_bench.cli.inspect_graph import graph_command
@@ -15,7 +17,7 @@ Examples:
   apo-bench inspect dof stick_in_tower
   apo-bench inspect graph stick_in_tower --out graph.svg
 """
-_COMMANDS = {
+_COMMANDS: Mapping[str, Callable[..., None]] = {
     "dof": dof_command,
     "plan": plan_command,
     "graph": graph_command,

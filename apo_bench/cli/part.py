@@ -28,9 +28,7 @@ def part_import(
     unit: Annotated[
         str | None, typer.Option(help="Unit of the file: mm, in, m, cm, ft or um; default: as the file states.")
     ] = None,
-    name: Annotated[
-        list[str] | None, typer.Option(help="Rename a face, such as hole1=bore; may be repeated.")
-    ] = None,
+    name: Annotated[list[str] | None, typer.Option(help="Rename a face, such as hole1=bore; may be repeated.")] = None,
     density: Annotated[float, typer.Option(min=1.0, max=25_000.0, help="Density in kg/m^3.")] = 1000.0,
     round_sides: Annotated[
         int, typer.Option("--round", min=5, max=64, help="Of a mesh: fewest flat sides of a full turn that are round.")

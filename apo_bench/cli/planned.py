@@ -4,9 +4,7 @@ from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.scenario import Scenario
 
 
-def plan_correction(
-    scenario: Scenario, observation: Observation, correction: Correction
-) -> tuple[Plan, str, float]:
+def plan_correction(scenario: Scenario, observation: Observation, correction: Correction) -> tuple[Plan, str, float]:
     """The plan, how it was moved so that it fits (empty if not), and its predicted success with any arm.
 
     Only a plan that would not fit needs a simulator.

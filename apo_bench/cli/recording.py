@@ -47,7 +47,7 @@ def recording_import(
 
     Examples:
       apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
-      apo-bench recording import log.csv --format csv --camera c.toml --objects o.toml --scenario dovetail --out seen.json
+      apo-bench recording import log.csv --format csv --camera c.toml --objects o.toml --scenario dovetail --out s.json
     """
     from apo_bench.importers.recording.camera_file import read_camera
     from apo_bench.importers.recording.formats import read_log

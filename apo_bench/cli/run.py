@@ -14,7 +14,6 @@ from apo_bench.cli.shared import (
     path_option,
     print_columns,
     print_json,
-    print_written,
     takes,
     trial_options,
 )
@@ -35,8 +34,8 @@ def run_command(
         float | None,
         typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own."),
     ] = None,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print every number that the trial records.")] = False,
-    view: Annotated[bool, typer.Option("--view", help="Step through the trial when it has ended, as `view` does.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print every number of the record.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Step through the trial after its end, as `view` does.")] = False,
     port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the record as one JSON object, nothing else.")] = False,
     **options: Any,
@@ -70,8 +69,8 @@ def run_command(
     if as_json:
         print_json(record)
     else:
-        print_columns(summary_lines(record, scenario, observation))
-        print_columns(trial_lines(record) if verbose else [])
+        more = trial_lines(record) if verbose else []
+        print_columns([*summary_lines(record, scenario, observation), *more])
     replayed = record["sim_time_s"] is not None
     if not replayed and (video or view):
         typer.echo("apo-bench: the robot did not replay anything, so there is nothing to see.", err=True)

@@ -45,9 +45,7 @@ def score_command(
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a few seeds of each condition, as a test.")] = False,
-    secret_seed_file: Annotated[
-        Path | None, path_option("Draw trials that nobody can draw without this file.")
-    ] = None,
+    secret_seed_file: Annotated[Path | None, path_option("Draw trials that nobody can draw without this file.")] = None,
     workers: Workers = None,
     backend: Backend = "local",
     address: Address = None,

@@ -8,7 +8,6 @@ from apo_bench.simulation.arm_checks.arm_check import ArmCheck
 from apo_bench.simulation.arms.arm import Arm
 
 
-
 def describe_arm(arm: Arm) -> str:
     """`6 joints, opens 85.6 mm, 44 N a pad, payload 5 kg; position servos made from the model`."""
     hand = f", {arm.hand.force_n:.0f} N a pad" if arm.hand is not None else ""

@@ -1,7 +1,6 @@
-"""One demonstration through the range finder, and what it made of that: as a record, as JSON, and as a table."""
+"""One demonstration through the depth camera, and the poses that it estimates, as a table and as one JSON object."""
 
-from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from apo_bench.trial.stages import (
 )
 from apo_bench.viz.tables import form_table
 
-_FORM = "apo-bench/eye/1"
+_SCHEMA = "apo-bench/depth/1"
 _COLUMNS = {
     "operation": "d",
     "moves": "",
@@ -38,24 +37,21 @@ _COLUMNS = {
 }
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SensorRun:
-    """A demonstration, what was measured of it, and what was made of that."""
+class DepthRun(NamedTuple):
+    """A demonstration, the images of it, and the events that the depth camera finds in them."""
 
-    name: str
-    """The name of the scenario."""
+    scenario: str
     simulated: SimulatedDemonstration
     watched: DemonstrationImages
     images: tuple[Array, ...]
-    """Measured range images, (views, height, width) each, [m]."""
+    """Measured depth images, (views, height, width) each, [m]."""
     events: tuple[Event, ...]
     models: ModelRays
-    """The parts as the range finder knows them."""
+    """The parts as the depth camera knows them."""
 
 
-def run_sensor(scenario: str, noise_mm: float, seed: int, human_error_scale: float) -> SensorRun:
-    """Let the human demonstrate, and watch: the same images and poses as in a trial with these settings.
+def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scale: float) -> DepthRun:
+    """Demonstrate, and estimate the poses: the same images and poses as in a trial with these settings.
 
     Raises:
         InputError: A setting that is not allowed.
@@ -66,50 +62,45 @@ def run_sensor(scenario: str, noise_mm: float, seed: int, human_error_scale: flo
     check("seed", seed)
     scene = build_scene(load_scenario(scenario))
     simulated = simulate_demonstration(scene, human_error_scale, seed, DEPTH_CAMERA)
-    if simulated.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
-    assert simulated.images is not None
+    if simulated.demonstration.code != "ok" or simulated.images is None:
+        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed.")
     sensor = range_sensor(scene, simulated, noise_mm)
     images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
     events = sensor.events(simulated.demonstration, images)
     models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
-    return SensorRun(scene.scenario.name, simulated, simulated.images, images, events, models)
+    return DepthRun(scene.scenario.name, simulated, simulated.images, images, events, models)
 
 
-def checked_view(view: int) -> int:
-    """The number of a view, from 0, of one given from 1.
-
-    Raises:
-        InputError: The range finder has no such view.
-    """
+def check_view(view: int) -> None:
+    """Refuse the number of a view, from 1, that the depth camera does not have."""
     views = len(RangeFinder().views)
-    require(1 <= view <= views, f"--view {view} was given; the range finder has views 1 to {views}.")
-    return view - 1
+    require(1 <= view <= views, f"--view must be from 1 to {views}, got {view}.")
 
 
-def sensor_form(run: SensorRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
-    """Everything that `apo-bench inspect depth` says, operations from 1; the error is that of the sensor, not the human's."""
-    by_operation = {event.operation: event for event in run.events if event.operation is not None}
+def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
+    """The JSON object: operations from 1; the error is that of the depth camera, without the human's."""
+    operations = []
+    events = {event.operation: event for event in run.events}
+    for k, operation in enumerate(run.simulated.demonstration.assembly.operations):
+        event = events.get(k)
+        form = {"operation": k + 1, "moves": list(operation.moves), "found": False}
+        operations.append(form if event is None or event.found is None else form | _estimate_form(event, run, k))
     return {
-        "schema": _FORM,
-        "scenario": run.name,
+        "schema": _SCHEMA,
+        "scenario": run.scenario,
         "noise_mm": noise_mm,
         "seed": seed,
         "human_error_scale": human_error_scale,
-        "firings_s": [round(t, 3) for t in run.watched.times_s],
-        "operations": [
-            {"operation": k + 1, "moves": list(operation.moves)} | _operation_form(by_operation.get(k), run, k)
-            for k, operation in enumerate(run.simulated.demonstration.assembly.operations)
-        ],
+        "images_s": [round(t, 3) for t in run.watched.times_s],
+        "operations": operations,
     }
 
 
-def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
-    if event is None or event.found is None:
-        return {"found": False}
-    deviation = np.sqrt(np.diag(event.found.covariance))
-    error = pose.log(pose.inverse(event.found.T) @ run.simulated.demonstration.poses[k])
-    packed = pose.pack(event.found.T)
+def _estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
+    found = event.found
+    deviation = np.sqrt(np.diag(found.covariance))
+    error = pose.log(pose.inverse(found.T) @ run.simulated.demonstration.poses[k])
+    packed = pose.pack(found.T)
     return {
         "found": True,
         "time_s": round(run.watched.times_s[event.last], 3),
@@ -122,6 +113,6 @@ def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, An
     }
 
 
-def sensor_table(form: dict[str, Any]) -> Any:
-    """The operations of `sensor_form` as a table of `rich`: when, how far off, how well known, explained by what."""
+def depth_table(form: dict[str, Any]) -> Any:
+    """The operations of `depth_form` as a table of `rich`."""
     return form_table(form["operations"], _COLUMNS)

@@ -98,7 +98,9 @@ def _line(explanation: Explanation, part: _DrawnPart) -> PanelLine:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
     o = part.operation
     groups = []
-    for along, words in grouped((free.along, f"{free.direction} ({format_deviation(free)})") for free in o.free).items():
+    for along, words in grouped(
+        (free.along, f"{free.direction} ({format_deviation(free)})") for free in o.free
+    ).items():
         others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
         groups.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
     if o.fixed:

@@ -47,15 +47,15 @@ def draw_graph(
     path: Path,
     title: str,
     *,
-    residuals: ArcResiduals,
-    gap_m: float,
     colors: Mapping[str, tuple[float, float, float]],
+    residuals: ArcResiduals = (),
+    gap_m: float = 0.0,
 ) -> None:
     """Write the picture as the suffix of `path` says.
 
     Args:
-        residuals: Of each arc, [m], written on it, in red if above `gap_m`; None where it is not known.
         colors: Part -> RGB in 0..1.
+        residuals: Of each arc, [m], written on it, in red if above `gap_m`; None where it is not known.
     """
     from matplotlib.figure import Figure
 
@@ -69,7 +69,7 @@ def draw_graph(
     figure.text(0.5, 0.99, title, ha="center", va="top", fontsize=10, color=_INK)
     legend = "dashed: disappeared; dash-dot: about an axis" + f"; red: above {gap_m * 1e3:g} mm" * any(residuals)
     figure.text(0.5, 0.01, legend, ha="center", va="bottom", fontsize=7.5, color=_GONE)
-    for arc, residual in zip(graph.arcs, residuals, strict=True):
+    for arc, residual in zip(graph.arcs, residuals or [None] * len(graph.arcs), strict=True):
         color = _INK if arc.lost is None else _GONE
         if residual is not None and residual > gap_m:
             color = _ALARM
@@ -77,8 +77,7 @@ def draw_graph(
         label = arc.name if residual is None else f"{arc.name}\n{residual * 1e3:.2f} mm"
         _draw_arrow(axes, places[arc.manipulated], places[arc.environment], color, style, label)
     for node in graph.nodes:
-        color = colors.get(node.part)
-        face = _GROUND if color is None else [_PALE + (1 - _PALE) * c for c in color]
+        face = [_PALE + (1 - _PALE) * c for c in colors[node.part]] if node.part in colors else _GROUND
         _draw_node(axes, node, places[node], face, graph.stands(node))
     save_figure(figure, path, dpi=110)
 

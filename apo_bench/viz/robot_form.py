@@ -125,9 +125,7 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     axis = goal[:3, :3] @ line.comes.line.direction
     macros = list(line.comes.macros)
     if not macros:
-        return [
-            _motion("put down", False, _shift(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames)
-        ]
+        return [_motion("put down", False, _shift(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames)]
     motions = []
     begin = goal
     ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]

@@ -44,15 +44,16 @@ def summary_lines(record: TrialRecord, scenario: str, observation: Path | None =
         observation: File of the observation, if it was measured.
     """
     predicted = record.get("predicted_success")
-    gap = record.get("gap_after_mm")
-    corrected = f"{record['method']}{'' if gap is None else f', contact gap {gap:.3f} mm after the correction'}"
+    gaps = [record.get(name) for name in ("gap_before_mm", "gap_after_mm")]
+    known = [f"{gap:.3f} mm {when}" for gap, when in zip(gaps, ("observed", "planned"), strict=True) if gap is not None]
+    correction = ", contact gap ".join((record["method"], *known[:1])) + "".join(f", {gap}" for gap in known[1:])
     if observation is None:
         again = replay_command(record, {record["scenario"]: scenario})
     else:
         again = f"apo-bench run {scenario} --observation {observation} --method {record['method']}"
     return [
         ("trial", f"{record['scenario']}, {', '.join(_describe_settings(record))}"),
-        ("correction", corrected),
+        ("correction", correction),
         ("result", _describe_result(record)),
         _decisive_line(record),
         ("predicted success", "unknown, since there is no plan" if predicted is None else f"{predicted:.2f}"),
@@ -125,7 +126,9 @@ def _list_adjustments(adjustments: Iterable[Mapping[str, Any]], _: TrialRecord) 
 
 def _describe_prediction(predicted: Mapping[str, Any], _: TrialRecord) -> str:
     size = "" if predicted.get("size_mm") is None else f", {predicted['size_mm']:.2f} mm"
-    return f"operation {predicted['operation']} fails: {predicted['code']}{size}" if predicted["fails"] else f"none{size}"
+    return (
+        f"operation {predicted['operation']} fails: {predicted['code']}{size}" if predicted["fails"] else f"none{size}"
+    )
 
 
 def _describe_test(p: float, record: TrialRecord) -> str:
@@ -134,7 +137,8 @@ def _describe_test(p: float, record: TrialRecord) -> str:
     return (
         f"chi-square {record['chi_square'] or 0.0:.1f} of {record['chi_square_dof']}, "
         f"{f'p {p:.2g}' if p else 'p < 1e-300'}: {'' if record['test_passes'] else 'not '}explained by the stated noise"
-        + f"; one of {suspects} may be wrong" * bool(suspects)
+        + f"; one of {suspects} may be wrong"
+        * bool(suspects)
     )
 
 
@@ -156,10 +160,17 @@ _DETAILS: tuple[tuple[str, str, str | Callable[[Any, TrialRecord], str]], ...] =
     ("failure_prediction", "predicted failure", _describe_prediction),
     ("p_value", "consistency test", _describe_test),
     ("dropped", "dropped", lambda names, _: ", ".join(names)),
-    ("gap_before_mm", "observed gap", "{gap_before_mm:.3f} mm"),
     ("least_overlap", "least overlap", "{least_overlap:.2f}"),
-    ("loose_success", "loose verdict", lambda loose, _: "every contact is made" if loose else "not every contact is made"),
-    ("pose_error_fixed_mm", "pose error", "{pose_error_fixed_mm:.3f} mm fixed by contacts, {pose_error_free_mm:.3f} mm free"),
+    (
+        "loose_success",
+        "loose verdict",
+        lambda loose, _: "every contact is made" if loose else "not every contact is made",
+    ),
+    (
+        "pose_error_fixed_mm",
+        "pose error",
+        "{pose_error_fixed_mm:.3f} mm fixed by contacts, {pose_error_free_mm:.3f} mm free",
+    ),
     (
         "planned_error_fixed_mm",
         "planned error",

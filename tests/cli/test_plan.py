@@ -18,7 +18,7 @@ from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import nominal_start
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.viz.plan_text import direction, plan_lines, plan_lines_form, plan_text
+from apo_bench.viz.plan_text import direction, plan_lines, plan_form, plan_text
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]
@@ -126,7 +126,7 @@ def test_the_table_covers_every_scenario() -> None:
 @pytest.mark.parametrize("name", TABLE)
 def test_states_and_macros_of_every_operation(name: str) -> None:
     scenario = load_scenario(name)
-    form = plan_lines_form(plan_lines(nominal(scenario), scenario), scenario)
+    form = plan_form(plan_lines(nominal(scenario), scenario), scenario)
     found = [
         (
             f"{step['before']['letter']} -> {step['after']['letter']}",

@@ -8,7 +8,7 @@ import pytest
 
 from apo_bench.assembly import Outcome
 from apo_bench.benchmark.analysis import tally
-from apo_bench.cli.terminal import print_cells
+from apo_bench.cli.rates import print_rates
 from apo_bench.cli.trial_text import print_row
 from apo_bench.trial.outcome_columns import result
 from tests.benchmark.analysis.test_rates import row
@@ -46,7 +46,7 @@ def test_a_test_says_whether_it_passes(p: float, passes: bool, words: str, capsy
 
 @pytest.mark.parametrize(("count", "words"), [(1, "1 row is left out"), (2, "2 rows are left out")])
 def test_demonstrations_that_failed_are_counted(count: int, words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    print_cells(tally([row("contact", 9), *(row("contact", i, None) for i in range(count))]))
+    print_rates(tally([row("contact", 9), *(row("contact", i, None) for i in range(count))]))
     assert words in capsys.readouterr().out
 
 

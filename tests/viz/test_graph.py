@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from apo_bench.assembly import Graph, relation_graph
-from apo_bench.viz.graph.drawing import draw_graph
+from apo_bench.viz.graph_picture import draw_graph
 from apo_bench.viz.graph.layout import Bend, layout_graph
-from apo_bench.viz.graph.text import mermaid_text
+from apo_bench.viz.graph_text import mermaid_text
 from tests import rounds, scenes
 
 

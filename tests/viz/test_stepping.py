@@ -21,7 +21,7 @@ from apo_bench.simulation.film.track import part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
-from apo_bench.viz.finished_trial import trial_again
+from apo_bench.viz.trial_again import trial_again
 from apo_bench.viz.stepping import FACES, Cursor
 
 

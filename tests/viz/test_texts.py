@@ -21,8 +21,8 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.viz.arm_text import list_line
 from apo_bench.viz.correct_text import correction_form, correction_lines, correction_tables
 from apo_bench.viz.fit_text import fit_form, fit_lines
-from apo_bench.viz.graph.text import graph_form, graph_lines
-from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
+from apo_bench.viz.graph_text import graph_form, graph_lines
+from apo_bench.viz.detection_text import confidence_lines, difference_lines, evidence_table, detection_form
 from tests import bop_made, scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
@@ -59,7 +59,7 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     observation = tower()
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
     recognised = DetectedContacts(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
-    form = recognition_form("tower", "detected", observation, recognised, False)
+    form = detection_form("tower", "detected", observation, recognised, False)
     _, right, wrong = table_lines(evidence_table(form))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
     assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
@@ -79,7 +79,7 @@ def test_a_set_of_contacts_that_is_not_likely_is_called_not_certain() -> None:
     recognised = DetectedContacts(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
 
     def said(recognised: DetectedContacts) -> list[str]:
-        return confidence_lines(recognition_form("tower", "detected", observation, recognised, False))
+        return confidence_lines(detection_form("tower", "detected", observation, recognised, False))
 
     (line,) = said(recognised)
     assert line.startswith("not certain: this set of contacts is right with probability 0.75")
@@ -93,7 +93,7 @@ def test_contacts_that_were_missed_are_named() -> None:
     every = tuple(evidence_of(r.contact, r.made) for r in observation.assembly.relations())
     fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
     forms = [
-        recognition_form("tower", "detected", observation, recognised, False)
+        detection_form("tower", "detected", observation, recognised, False)
         for recognised in (DetectedContacts(observation.assembly, every), DetectedContacts(fewer.assembly, every[:1]))
     ]
     assert difference_lines(forms[0]) == [f"all {len(every)} contacts of the scenario were recognised, and no other"]

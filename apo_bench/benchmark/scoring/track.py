@@ -62,7 +62,8 @@ class TrackTable(Table, frozen=True, kw_only=True):
     title: Text
     overall: bool = True
     quick_trials: Annotated[int, Meta(ge=1)] = 1
-    arms: Text | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
+    arms: str | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
+    """A pattern in a union with a tuple makes msgspec free it twice."""
 
 
 def seen_by(track: Track, estimator: str) -> Track:

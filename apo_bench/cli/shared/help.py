@@ -55,16 +55,16 @@ class Interrupted(Exception):
 
 
 class _WithExamples:
-    """Takes the lines below `Examples:` out of the help text and writes them at the end, each on its line."""
+    """Writes the lines below `Examples:` of the help text at the end, each on its line."""
 
-    def __init__(self, *args: Any, help: str | None = None, **more: Any) -> None:
-        text, _, examples = cleandoc(help or "").partition("\n\nExamples:\n")
-        super().__init__(*args, help=text, epilog=examples, **more)
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self.help, _, self.examples = cleandoc(more["help"] or "").partition("\n\nExamples:\n")
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         """Write the examples."""
         with formatter.section("Examples"):
-            formatter.write("".join(f"{line}\n" for line in (self.epilog or "").splitlines()))  # type: ignore[attr-defined]
+            formatter.write("".join(f"{line}\n" for line in self.examples.splitlines()))
 
 
 class Command(_WithExamples, TyperCommand):
@@ -83,7 +83,9 @@ class Command(_WithExamples, TyperCommand):
         if self.name not in ("run", "sweep"):
             return super().format_options(ctx, formatter)
         records = {p.opts[0]: record for p in self.get_params(ctx) if (record := p.get_help_record(ctx)) is not None}
-        lists = {heading: [records.pop(name) for name in names if name in records] for heading, names in OPTIONS.items()}
+        lists = {
+            heading: [records.pop(name) for name in names if name in records] for heading, names in OPTIONS.items()
+        }
         arguments = [records.pop(name) for name in list(records) if not name.startswith("-")]
         for heading, listed in ({"Arguments": arguments} | lists | {OTHERS: list(records.values())}).items():
             if listed:
@@ -94,6 +96,10 @@ class Command(_WithExamples, TyperCommand):
 
 class Group(_WithExamples, TyperGroup):
     """The commands of `apo-bench` under the headings of `GROUPS`; those of a group in one list."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Show the help page where no command is named."""
+        return super().parse_args(ctx, args or ["--help"])
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a list for each heading that has a command here."""
@@ -107,4 +113,4 @@ class Group(_WithExamples, TyperGroup):
 
 def group(name: str, description: str) -> typer.Typer:
     """Commands below one name."""
-    return typer.Typer(name=name, cls=Group, rich_markup_mode=None, help=description, no_args_is_help=True)
+    return typer.Typer(name=name, cls=Group, rich_markup_mode=None, help=description)

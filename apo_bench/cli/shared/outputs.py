@@ -9,7 +9,9 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_target
 
 
-def check_output(path: Path | None, option: str, *endings: str, inputs: tuple[Path, ...] = (), new: bool = False) -> None:
+def check_output(
+    path: Path | None, option: str, *endings: str, inputs: tuple[Path, ...] = (), new: bool = False
+) -> None:
     """Refuse a file that cannot be written, or that the command also reads; None is no file.
 
     Args:
@@ -27,13 +29,12 @@ def check_output(path: Path | None, option: str, *endings: str, inputs: tuple[Pa
     )
     if path.parent.is_dir():
         check_target(path)
-    require(
-        path.parent.is_dir() and not path.is_dir() and all(os.access(p, os.W_OK) for p in (path.parent, path) if p.exists()),
-        f"{option} {path} cannot be written; name a file in a folder that exists and can be written.",
-    )
+    writable = path.parent.is_dir() and not path.is_dir() and os.access(path if path.exists() else path.parent, os.W_OK)
+    require(writable, f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")
     require(not (new and path.exists()), f"{option} {path} exists already; name another file, or add --overwrite.")
-    read = any(path.exists() and source.exists() and path.samefile(source) for source in inputs)
-    require(not read, f"{option} {path} is a file that the command reads; name another file.")
+    for source in inputs:
+        same = path.exists() and source.exists() and path.samefile(source)
+        require(not same, f"{option} {path} is a file that the command reads; name another file.")
 
 
 @contextmanager

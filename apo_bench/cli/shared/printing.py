@@ -2,13 +2,13 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from apo_bench.io import clean
+from apo_bench.io import clean, columns
 
 
 def print_json(form: Any) -> None:
@@ -28,13 +28,17 @@ def print_written(*paths: Path | None, as_json: bool = False) -> None:
         say("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None), as_json)
 
 
-def print_columns(lines: Sequence[Sequence[str]]) -> None:
-    """Print cells below each other, wrapped within the last column."""
+def print_columns(lines: Iterable[Sequence[str]]) -> None:
+    """Print cells below each other; on a terminal they are wrapped within their column."""
     from rich.table import Table
 
+    cleaned = [[clean(cell) for cell in cells] for cells in lines]
+    if not sys.stdout.isatty():
+        typer.echo("\n".join(columns(cleaned)))
+        return
     table = Table(box=None, pad_edge=False, show_header=False)
-    for cells in lines:
-        table.add_row(*map(clean, cells))
+    for cells in cleaned:
+        table.add_row(*cells)
     console().print(table)
 
 

@@ -9,7 +9,7 @@ import typer
 from apo_bench.errors import InputError
 
 _Value = TypeVar("_Value")
-_FORMS = {float: "numbers such as 0,0.5,1", int: "whole numbers such as 0,2,4", str: "names"}
+_FORMS: dict[object, str] = {float: "numbers such as 0,0.5,1", int: "whole numbers such as 0,2,4", str: "names"}
 
 
 def parse_list(text: str, option: str, kind: Callable[[str], _Value]) -> tuple[_Value, ...]:
@@ -23,8 +23,8 @@ def parse_list(text: str, option: str, kind: Callable[[str], _Value]) -> tuple[_
     raise InputError(f"{option} takes {_FORMS[kind]}, separated by single commas, got '{text}'.")
 
 
-def parse_path(text: str) -> Path:
+def parse_path(text: str | Path) -> Path:
     """A path that names something: the empty text would stand for the current folder."""
-    if not text.strip():
+    if not str(text).strip():
         raise typer.BadParameter("the path is empty; name a file or a folder.")
     return Path(text)

@@ -16,7 +16,7 @@ import pytest
 
 from apo_bench.benchmark.report.report import Report, report
 from apo_bench.cli.app import main
-from apo_bench.cli.terminal import print_report
+from apo_bench.cli.rates import print_report
 from apo_bench.errors import InputError
 from apo_bench.io import write_columns
 from tests import pages

@@ -22,7 +22,7 @@ from apo_bench.assembly import SharedError
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.viz.explain_text import sentences
+from apo_bench.viz.dof_text import sentences
 
 
 def shown(name: str, seed: int) -> Demonstration:

@@ -320,7 +320,7 @@ def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
+        "apo_bench.viz.depth_run.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
     assert main(["inspect", "depth", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()

@@ -16,7 +16,7 @@ from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.perception.observation.plain import Plain
-from apo_bench.viz.noise_card import Drawn, describe_model, draw_errors, find_facts, list_models, write_card
+from apo_bench.viz.noise_sheet import Drawn, describe_model, draw_errors, find_facts, list_models, noise_sheet
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -158,7 +158,7 @@ def test_the_page_of_cards_is_up_to_date(name: str) -> None:
 def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
     errors = np.zeros((5, 4))
     errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 7.0]
-    text = write_card("isotropic", NOISE_LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
+    text = noise_sheet("isotropic", NOISE_LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
     across = next(line for line in text.splitlines() if line.startswith("| across"))
     assert across.split("|")[2:5] == [f"{cell:>10} " for cell in ("3.61", "3", "2")]
     assert "5 operations of stick_in_tower; 25.0 % were not seen" in text
@@ -178,7 +178,7 @@ def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
     ],
 )
 def test_a_card_says_what_its_level_means(given: object, noise_level: NoiseLevel, words: str) -> None:
-    assert f"\n{words}" in write_card(given, noise_level, draw_errors(given, noise_level, 10))
+    assert f"\n{words}" in noise_sheet(given, noise_level, draw_errors(given, noise_level, 10))
 
 
 def test_no_level_reaches_a_plain_function() -> None:

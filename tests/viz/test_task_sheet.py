@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.scenario.file import scenario_names
-from apo_bench.viz.card import cards, scenario_card
+from apo_bench.viz.task_sheet import cards, task_sheet
 from benchmarks.baselines import HEAD, describe, describe_nominal, read_counts
 
 JUDGE = Path(__file__).parents[2] / "docs" / "how" / "judge.md"
@@ -17,7 +17,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 
 
 def test_the_operations_of_fig_6() -> None:
-    text = scenario_card(load_scenario("pocket_table"))
+    text = task_sheet(load_scenario("pocket_table"))
     for line in (
         "3. cube3 onto table and against cube1: R3 cube3 -> table (nz-top), R4 cube3 -> cube1 (px-nx)",
         "4. cube1 onto table: R5 cube1 -> table (nz-top); loses R1, R4",
@@ -30,18 +30,18 @@ def test_the_operations_of_fig_6() -> None:
 
 
 def test_who_follows_a_careless_human() -> None:
-    text = scenario_card(load_scenario("vanished_fixture"))
+    text = task_sheet(load_scenario("vanished_fixture"))
     assert (
         "operation 2 puts cube 1.5 to 4 mm aside along its y axis, to either side; castle2 (operation 3) follows;"
         in text
     )
-    assert "follow" not in scenario_card(load_scenario("carried_bridge"))
-    assert "No carelessness is drawn." in scenario_card(load_scenario("bridge_cycle"))
+    assert "follow" not in task_sheet(load_scenario("carried_bridge"))
+    assert "No carelessness is drawn." in task_sheet(load_scenario("bridge_cycle"))
 
 
 def test_numbers_are_those_of_the_scenario() -> None:
     scenario = load_scenario("stick_in_tower")
-    text = scenario_card(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, displaced_mm=7.0)))
+    text = task_sheet(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, displaced_mm=7.0)))
     assert "within 0.5 mm (at 0.4 mm clearance per side)" in text
     assert "more than 7 mm from where it was put" in text
     assert "x 120 ± 40 mm, y 0 ± 60 mm, turned by -28 to 28 degrees" in text
@@ -51,7 +51,7 @@ def test_numbers_are_those_of_the_scenario() -> None:
 @pytest.mark.parametrize("name", ["gearbox", "pocket_table"])
 def test_every_scenario_says_all_of_it(name: str) -> None:
     scenario = load_scenario(name)
-    text = scenario_card(scenario)
+    text = task_sheet(scenario)
     heads = [line for line in text.splitlines() if line.startswith("## ")]
     assert heads == ["## Parts", "## Operations", "## The human", "## What varies", "## Success"]
     for words in (scenario.title, scenario.paper, scenario.human, scenario.success):

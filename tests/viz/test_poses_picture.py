@@ -11,7 +11,7 @@ from apo_bench import Observation, correct, load_scenario
 from apo_bench.cli import app as cli
 from apo_bench.formats.observation import as_planned
 from apo_bench.geometry import pose
-from apo_bench.viz.believed_picture import belief_lines, belief_panel
+from apo_bench.viz.poses_picture import poses_lines, poses_panel
 
 SHIFT_M = 2e-3
 
@@ -27,14 +27,14 @@ def lifted() -> Observation:
 
 def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     seen = lifted()
-    found = belief_panel("as seen", seen, seen.poses, 3)
+    found = poses_panel("as seen", seen, seen.poses, 3)
     assert found.gap_m == pytest.approx(SHIFT_M)
     wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
     assert found.open == wrong
     np.testing.assert_array_equal(found.poses["castle2"], seen.poses[1])
-    mended = belief_panel("corrected", seen, correct(seen, "contact").poses, 3)
+    mended = poses_panel("corrected", seen, correct(seen, "contact").poses, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
-    assert belief_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
+    assert poses_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
 
 
 def test_disappeared_contacts_are_said_to_be() -> None:
@@ -42,7 +42,7 @@ def test_disappeared_contacts_are_said_to_be() -> None:
     seen = as_planned(scenario, 1.0, 1.0)
     goals = np.array(seen.poses)
     goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
-    found = belief_panel("as seen", seen, goals, len(goals))
+    found = poses_panel("as seen", seen, goals, len(goals))
     assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)
 
 

@@ -20,7 +20,7 @@ from apo_bench.simulation.execution.probing.places import floor_places, opposite
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.simulation.robot.by_wrist import wrist_of
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.viz.acts_form import acts_form
+from apo_bench.viz.probing_form import probing_form
 from tests.viz.test_robot_form import BASE, TOOL, matrix
 
 NAMES = ["stick_in_tower", "peg_in_hole"]
@@ -41,7 +41,7 @@ def plan(name: str) -> Plan:
 
 @cache
 def form(name: str, frames: str = "tip", sensor: str = "wrist") -> dict[str, Any]:
-    return json.loads(json.dumps(acts_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
+    return json.loads(json.dumps(probing_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
 
 
 def tip(said: dict[str, Any], frames: str) -> Array:
@@ -126,4 +126,4 @@ def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor
 
 def test_an_unknown_sensor_is_refused() -> None:
     with pytest.raises(InputError, match="externl"):
-        acts_form(plan("stick_in_tower"), scene("stick_in_tower"), RobotFrames(), "externl")
+        probing_form(plan("stick_in_tower"), scene("stick_in_tower"), RobotFrames(), "externl")
