@@ -64,7 +64,7 @@ _EXPORTS = MappingProxyType(
         "read_observation": "apo_bench.formats.observation",
         "replay": "apo_bench.simulation.execution.controller",
         "run_sweep": "apo_bench.benchmark.sweeps.sweep",
-        "run_trial": "apo_bench.trial.trial",
+        "run_trial": "apo_bench.trial.run",
     }
 )
 """Name -> the module that it is imported from when it is first asked for."""

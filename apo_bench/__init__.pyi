@@ -38,6 +38,6 @@ from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
 from apo_bench.trial.fitting import fitting_plan as fitting_plan
-from apo_bench.trial.trial import run_trial as run_trial
+from apo_bench.trial.run import run_trial as run_trial
 
 __version__: str

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.scenario.scenario import Scenario
 
 KEPT = Path(__file__).parent / "results" / "baselines.csv"
@@ -67,7 +67,7 @@ class Count(NamedTuple):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    counts = count(read_rows(parser.parse_args().folder))
+    counts = count(read_records(parser.parse_args().folder))
     with KEPT.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, *Count._fields])

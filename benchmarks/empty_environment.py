@@ -47,7 +47,7 @@ print(count)
 """
 MAKE = """
 import gymnasium, numpy, apo_bench
-env = gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0)
+env = gymnasium.make("APOReplay-v0", scenario="block_on_block", noise_level=0.0, human_error_scale=0.0)
 env.reset(seed=0)
 print(env.step(numpy.zeros(env.action_space.shape))[1])
 """

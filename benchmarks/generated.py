@@ -1,4 +1,4 @@
-"""Assemblies of three to eight parts with random dimensions: part files, poses, and scenarios made without a hand.
+"""Assemblies of three to eight parts with random dimensions: part files, poses, and scenarios without manual work.
 
 Plates, pins, bushes, brackets, covers, slots and rings; lengths in mm. `generated_rates.py` measures them.
 """
@@ -14,7 +14,6 @@ import numpy as np
 from apo_bench.importers.assembly.draft import draft
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.records import TrialConfig
 from apo_bench.scenario.parts.making import (
     Body,
     Frustum,
@@ -27,14 +26,12 @@ from apo_bench.scenario.parts.making import (
     turned,
     write_part,
 )
-from apo_bench.trial.stages import scene_of
-from apo_bench.trial.trial import run_trial
 
 DENSITY = 700.0
 
 
 class Place(NamedTuple):
-    """Where a copy of a part is in the end."""
+    """The final pose of a copy of a part."""
 
     part: str
     name: str
@@ -43,14 +40,14 @@ class Place(NamedTuple):
 
 
 class Assembled(NamedTuple):
-    """An assembly as a CAD program would have it."""
+    """An assembly as a CAD program exports it."""
 
     parts: Mapping[str, Body]
     places: tuple[Place, ...]
 
 
 def generated(seed: int) -> Assembled:
-    """One assembly; the same for the same seed."""
+    """Draw the assembly of a seed."""
     rng = np.random.default_rng([seed, 18])
     return FAMILIES[seed % len(FAMILIES)](lambda low, high: round(float(rng.uniform(low, high)), 1), rng)
 
@@ -219,7 +216,7 @@ FAMILIES = (pinned, bushed, bracketed, slotted, stacked)
 
 
 def write(made: Assembled, folder: Path) -> Path:
-    """Part files and poses; returns the file of poses."""
+    """Write part files and poses, and return the file of poses."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, body in made.parts.items():
         write_part(name, body, folder, density=DENSITY, source="benchmarks/generated.py", licence="CC0-1.0")
@@ -234,18 +231,9 @@ def write(made: Assembled, folder: Path) -> Path:
 
 
 def scenario_of(seed: int, folder: Path) -> Path:
-    """The scenario file of one assembly, made without a hand."""
+    """Write the scenario file of the assembly of a seed."""
     poses = write(generated(seed), folder)
     path = folder / f"generated_{seed}.toml"
     made = draft(on_the_table(read_posed(poses)))
     write_scenario(made, path, f"Generated assembly {seed}", poses.name)
     return path
-
-
-def rate(path: Path, method: str, seeds: int, fidelity: str) -> tuple[int, int]:
-    """How many trials at 1 mm and 1 degree are right, of how many that count."""
-    asked = [TrialConfig(str(path), method=method, seed=seed, fidelity=fidelity) for seed in range(seeds)]
-    scene = scene_of(asked[0]) if asked else None
-    rows = [run_trial(each, scene) for each in asked]
-    counted = [row["success"] for row in rows if row["success"] is not None]
-    return sum(map(bool, counted)), len(counted)

@@ -9,14 +9,14 @@ from typing import TypeVar
 
 from apo_bench.benchmark.analysis import Rate
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 
 Key = TypeVar("Key")
 
 
 def read_judged(folders: Iterable[Path]) -> list[TrialRecord]:
     """Return the trials of sweeps that have a verdict."""
-    return [row for folder in folders for row in read_rows(folder) if row["success"] is not None]
+    return [row for folder in folders for row in read_records(folder) if row["success"] is not None]
 
 
 def group(rows: Iterable[TrialRecord], key: Callable[[TrialRecord], Key]) -> dict[Key, list[TrialRecord]]:

@@ -99,8 +99,9 @@ def page(found: Mapping[Place, Sequence[TrialRecord]], half: Iterable[TrialRecor
         f"## Errors along the ten operations of {CHAIN}",
         "",
         "No human error. In mm, in the median: how far corners of parts were planned from their true places in "
-        "directions that contacts fix; and how far off `contact` left parts, in fixed directions and in free ones, such "
-        "as where on the table the base stands. The last column is the operation at which `uncorrected` fails (median).",
+        "directions that contacts fix; and how far off `contact` left parts, in fixed directions and in free ones, "
+        "such as where on the table the base stands. The last column is the operation at which `uncorrected` fails "
+        "(median).",
         "",
         *table(
             (

@@ -33,7 +33,7 @@ from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "wrong_contacts.csv"

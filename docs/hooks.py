@@ -28,7 +28,7 @@ GENERATED = {
     "reference/command-line.md": command_line.page,
     "reference/files.md": file_keys.page,
     "reference/settings.md": fields.settings_page,
-    "reference/row.md": fields.row_page,
+    "reference/trial-record.md": fields.row_page,
 }
 LOADED = re.compile(
     r"<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)=[\"']?(?:https?:)?//[^>]*>", re.IGNORECASE

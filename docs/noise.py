@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.viz.noise_sheet import SCENARIO, draw_errors, list_models, nominal_demonstration, noise_sheet
+from apo_bench.viz.noise_sheet import SCENARIO, draw_errors, list_models, noise_sheet, nominal_demonstration
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"
@@ -20,7 +20,7 @@ INTRODUCTION = """
 A noise model makes an observation of the true poses: the pose of each operation with an error, the covariance that the
 camera states, and whether the operation was seen. In the formulas T is the pose of a part in the world, exp(xi) the
 displacement of a twist (x, y, z, rx, ry, rz) in the part's own frame, e are independent standard normal numbers, and L
-is the [level](words.md#level): in mm for positions, in degrees for turns. Levels only scale the same random numbers, so
+is the [level](glossary.md#level): in mm for positions, in degrees for turns. Levels only scale the same random numbers, so
 one seed gives comparable errors at all of them. At level 0 the models below see everything exactly. The stated
 covariance also holds the mean square of the person's error, where the scenario has one, and at least 0.05 mm and 0.05
 degrees.

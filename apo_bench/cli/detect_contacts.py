@@ -39,14 +39,14 @@ def detect_contacts_command(
       apo-bench detect-contacts stick_in_tower --observation docs/seen.csv --contact-source detected-jointly
     """
     from apo_bench.formats.deviations import assumed_deviations
-    from apo_bench.trial.detected_contacts import recognise_by
-    from apo_bench.trial.request import looked_at
+    from apo_bench.trial.detected_contacts import detect_by
+    from apo_bench.trial.request import load_or_draw_observation
     from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
 
     require_known("contact source", contact_source, DETECTED)
     with redirect_output(as_json):
-        observed, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
-    form = detection_form(scenario, contact_source, observed, recognise_by(observed, contact_source), assumed)
+        observed, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
+    form = detection_form(scenario, contact_source, observed, detect_by(observed, contact_source), assumed)
     if as_json:
         print_json(form)
         return

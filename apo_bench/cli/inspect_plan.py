@@ -80,7 +80,7 @@ def plan_command(
     robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if arm is not None:
         from apo_bench.simulation.arms.finding import find_arm
-        from apo_bench.trial.planning import arm_sentence
+        from apo_bench.trial.plan_warnings import arm_sentence
 
         notes.append(arm_sentence(task, None if observation is None else plan, arm))
         if frames is None:
@@ -113,7 +113,8 @@ def _require_with(option: str, value: object, others: dict[str, Any]) -> None:
 
 def _plan_observation(read: ObservationFile, method: str, notes: list[str]) -> tuple[Plan, float]:
     """The plan that a method makes from an observation, and its predicted success; adds notes."""
-    from apo_bench.trial.planning import apply_method, plan_warning
+    from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.trial.planning import apply_method
     from apo_bench.trial.predicted_success import predict_success
 
     require(method != "oracle", "--method oracle needs the true poses, which an observation does not hold.")

@@ -41,8 +41,8 @@ def poses_command(
     """
     from apo_bench import correct, fitting_plan, load_scenario
     from apo_bench.formats.deviations import assumed_deviations
-    from apo_bench.trial.planning import plan_warning
-    from apo_bench.trial.request import looked_at
+    from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.trial.request import load_or_draw_observation
     from apo_bench.viz.poses_picture import draw_poses, poses_lines, poses_panel
 
     check_output(out, "--out", ".png")
@@ -50,7 +50,7 @@ def poses_command(
     last = len(task.assembly)
     step = last if step is None else step
     require(1 <= step <= last, f"--step must be from 1 to {last}, got {step}.")
-    seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
+    seen, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
     _check_observed(seen, step)
     panels = [poses_panel("observed", seen, seen.poses, step)]
     if not observed:

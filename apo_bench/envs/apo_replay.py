@@ -43,7 +43,7 @@ from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_scene, data_with_arm
 from apo_bench.trial.fitting import fitting_plan
-from apo_bench.trial.predicted_success import abstained, predict_success
+from apo_bench.trial.predicted_success import abstain, predict_success
 from apo_bench.trial.stages import (
     demonstration_failure,
     observation_failure,
@@ -337,7 +337,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         drawn = robot.robot_error, robot.probe, robot.probe
         predicted_success = predict_success(plan, self.observation, self._correction, self._scene, *drawn)
         if predicted_success < self._min_predicted_success:
-            failure = abstained(predicted_success, self._min_predicted_success)
+            failure = abstain(predicted_success, self._min_predicted_success)
             return failed, failure, predicted, predicted_success
         watch = self._rendering.watch(self._scene, self.render_mode)
         attempt = execute_plan(robot, plan, self._scene, simulated.layout.poses, episode.trial, watch, self._fidelity)

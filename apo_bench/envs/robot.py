@@ -7,8 +7,8 @@ from apo_bench.geometry import Array
 from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_ft_sensor, checked_robot_error
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.scene import Scene
+from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import WRENCH, Attempt, draw_robot_error, replay_and_judge, stream_key
-from apo_bench.trial.trial import probing_config
 
 LONGEST_REPLAY_S = 1000.0
 """Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""

@@ -18,8 +18,9 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.io import each_line
 from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, record_key, settings_of
-from apo_bench.records.run.replay_command import Files, left_out, own_code
-from apo_bench.records.run.validation import row_of
+from apo_bench.records.own_code import describe_own_code, own_code
+from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.validation import record_of
 
 _SIZE = (640, 480)
 _QUALITY = 82
@@ -52,7 +53,7 @@ def failure_pictures(
     missed: list[str] = []
     for record in chosen:
         if not trust_code and own_code(record):
-            missed.append(left_out([record]))
+            missed.append(describe_own_code([record]))
             continue
         try:
             pictures.append(_draw_failure(record, folder, files or {}, secret_seed))
@@ -96,7 +97,7 @@ def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
     path = folder / "trials.jsonl"
     for number, line in each_line(path, "table of trials"):
         if all(part in line for part in wanted):
-            whole = row_of(line, f"{path}, line {number}")
+            whole = record_of(line, f"{path}, line {number}")
             if record_key(whole) == record_key(record):
                 return whole
     return {}

@@ -6,9 +6,9 @@ from pathlib import Path
 from apo_bench.errors import InputError
 from apo_bench.io import each_line
 from apo_bench.records import TrialConfig, TrialRecord, read_secret_seed, settings_of
-from apo_bench.records.run.replay_command import own_code
+from apo_bench.records.own_code import own_code
 from apo_bench.records.run.run_file import read_run, scenario_files
-from apo_bench.records.run.validation import row_of
+from apo_bench.records.run.validation import record_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial.fingerprint import config_hash, content_hash
@@ -52,7 +52,7 @@ def why_different(record: TrialRecord, config: TrialConfig) -> str:
     if config_hash(config, content) == record.get("config_hash"):
         return ""
     secret = record.get("secret_seed") is not None and config.secret_seed is None
-    return "its secret seed is missing (--secret-seed-file)" if secret else "other code or assets made it"
+    return "its secret seed is missing (--secret-seed-file)" if secret else "another version or other files made it"
 
 
 def run_again(config: TrialConfig) -> tuple[TrialRecord, Rollout | None]:
@@ -68,7 +68,7 @@ def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
     count = 0
     for count, line in each_line(path, "table of trials"):
         if number in (None, count):
-            record = row_of(line, f"{path}, line {count}")
+            record = record_of(line, f"{path}, line {count}")
             if number is not None or (record["success"] is False and record["sim_time_s"] is not None):
                 return count, record
             first = first or (count, record)

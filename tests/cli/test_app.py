@@ -14,7 +14,7 @@ from apo_bench import load_scenario
 from apo_bench.cli import app as cli
 from apo_bench.cli.method import METHODS as DESCRIBED
 from apo_bench.records import METHODS, RECORD_SCHEMA
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.scenario.file import scenario_names
 
 SEEN = Path(__file__).parents[2] / "docs" / "seen.csv"
@@ -260,7 +260,7 @@ def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixtu
     code, out, err = run(capsys, "sweep", "block_on_block", *options, *some)
     assert (code, err) == (0, "")
     assert "0.0 to 65.8 %" in out
-    assert [row["seed"] for row in read_rows(out_folder)] == [3, 4]
+    assert [row["seed"] for row in read_records(out_folder)] == [3, 4]
     code, out, err = run(capsys, "report", str(out_folder))
     assert (code, err) == (0, "")
     for name in ("tables/cells.csv", "report.html"):

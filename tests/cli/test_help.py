@@ -16,7 +16,8 @@ from apo_bench.cli.shared import GROUPS, OPTIONS, completion
 from apo_bench.cli.shared.completion import offered_names
 from apo_bench.cli.shared.help import OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
-from apo_bench.records.short_names import checked_contact_source, checked_method
+from apo_bench.records.contact_sources import checked_contact_source
+from apo_bench.records.methods import checked_method
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 

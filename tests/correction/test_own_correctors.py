@@ -12,8 +12,8 @@ import pytest
 
 from apo_bench import InputError, Scene, TrialConfig, build_scene, correct, load_scenario
 from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import simulate_demonstration
-from apo_bench.trial.trial import trial_row
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -91,7 +91,7 @@ def scene() -> Scene:
 
 def row_of(scene: Scene, method: str, **more: Any) -> dict[str, Any]:
     settings = TrialConfig("block_on_block", human_error_scale=0.0, method=method, seed=1, **more)
-    return dict(trial_row(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
+    return dict(record_trial(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
 
 
 def test_a_function_named_by_its_module_is_asked_as_one_by_name() -> None:

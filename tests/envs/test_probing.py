@@ -10,7 +10,7 @@ from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
-from apo_bench.trial import trial
+from apo_bench.trial import run
 
 SCENARIO = "block_on_block"
 
@@ -22,7 +22,7 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
         given.append(plain[4])
         raise InterruptedError
 
-    for where in (robot, trial):
+    for where in (robot, run):
         monkeypatch.setattr(where, "replay_and_judge", noted)
     settings = {"robot_error": "hand_eye:0.5/0.1", "ft_sensor": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
     env = Corrected(APOReplay(SCENARIO, probe=True, **settings))
@@ -30,7 +30,7 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))
     with pytest.raises(InterruptedError):
-        trial.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
+        run.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
     assert all(config.spiral for config in given)
     ours, theirs = (config.probing for config in given)
     assert (ours.ft_sensor, ours.seed, ours.actions) == (theirs.ft_sensor, theirs.seed, theirs.actions)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
 from apo_bench.perception.observation.models.facts import NoiseLevel
 from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from tests import scenes
 from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, MM, part, pin, plate, ring, scene, tube, wall

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
+from apo_bench import Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.prepare import moves
@@ -17,7 +17,7 @@ from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose, timestep
+from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -223,20 +223,3 @@ def test_sleep_ends_with_the_replay():
     assert options.enableflags == before
     row("oracle", "near-contact")
     assert options.enableflags == before
-
-
-def test_contact_is_refused_for_the_ideal_gripper():
-    with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
-        TrialConfig("stick_in_tower", grasp="weld", fidelity="near-contact")
-
-
-def test_a_stick_that_rocked_for_ever_comes_to_rest():
-    spec = TrialConfig("stick_in_tower", 4.0, 4.0, 1.0, method="contact", seed=1)
-    assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
-
-
-def test_steps_of_another_length_are_for_a_while():
-    model = scene().work.model
-    with pytest.raises(IndexError), timestep(model, 0.0005):
-        [][round(model.opt.timestep / 0.0005) - 1]
-    assert model.opt.timestep == 0.001

@@ -112,14 +112,6 @@ def test_a_group_is_put_back_as_one_and_what_touches_is_left_alone() -> None:
         assert (data.qvel == 0.5).all()
 
 
-def test_the_ideal_gripper_needs_no_help(tower: Scene) -> None:
-    scene = build_scene(tower.scenario, grasp="weld")
-    robot = Robot(scene, scene.scenario.start)
-    robot.forces.hold("stick")
-    robot.steady(True)
-    assert robot._carried is None
-
-
 GRASPED = pose.at((0.01, 0.02, 0.03), (0.0, 90.0, 20.0))
 """A part in the frame of the tip."""
 
@@ -130,11 +122,3 @@ def test_a_shaft_that_rolls_between_the_pads_turns_about_the_point_between_them_
     assert (moved.operation, moved.carried_m, moved.carried_rad) == (2, 0.0, pytest.approx(0.0, abs=1e-7))
     assert moved.moved_m == pytest.approx(0.0, abs=1e-12)
     assert moved.moved_rad == pytest.approx(np.radians(30.0))
-
-
-def test_the_larger_one_counts_of_two_grips_and_what_was_never_held_is_left_out():
-    slid = pose.at((0.0, 0.0, 0.004)) @ GRASPED
-    watch = GraspSlipMonitor().finish(0).grasp(GRASPED).carry(slid).release(slid).grasp(slid).release(slid).finish(1)
-    (moved,) = watch.finished
-    assert (moved.operation, moved.carried_m, moved.moved_m) == (1, pytest.approx(0.004), pytest.approx(0.004))
-    assert watch.grasped is None

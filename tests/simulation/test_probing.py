@@ -18,8 +18,8 @@ from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fi
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
+from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
-from apo_bench.trial.trial import probing_config
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 
@@ -130,7 +130,10 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
     probing = probing_config(plan(name), scene(name), "in_hand:0.5/1", (6,))
     felt = replay_and_judge(
-        plan(name), scene(name), plan(name).target_poses, config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+        plan(name),
+        scene(name),
+        plan(name).target_poses,
+        config=ExecutionConfig("near-contact", robot_error=error, probing=probing),
     )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)

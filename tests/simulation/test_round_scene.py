@@ -1,6 +1,5 @@
 """Scenes of convex pieces: their geoms are where the part has them, and what is round rests."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -56,12 +55,6 @@ def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
         assert apart.min(axis=1).max() < 1e-8
 
 
-def test_a_shaft_is_a_true_cylinder(scene: Scene):
-    geom = scene.work.model.geom("peg/p1")
-    assert int(geom.type[0]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-    assert geom.size[:2] == pytest.approx([0.005, 0.025])
-
-
 @pytest.mark.parametrize("part", ["peg", "plate"])
 def test_mass_and_inertia_are_those_of_the_exact_solid(scene: Scene, part: str):
     model = scene.work.model
@@ -87,22 +80,6 @@ def test_parts_of_boxes_are_simulated_as_their_file_says_them():
             assert int(geom.condim[0]) == 3
     spec = room_with_parts(scenario, scene.clearance_mm, scene.physics)
     assert not any(body.explicitinertial for body in spec.bodies)
-
-
-def test_a_piece_that_goes_on_along_the_tangent_of_a_hole_is_no_wall_of_it():
-    solid = solid_of("plate", PLATE)
-    (hole,) = (face for face in solid.rounds.values() if face.hole)
-    out, along = (np.array([np.cos(a), np.sin(a), 0.0]) for a in np.radians([40.0, -50.0]))
-    corners = [
-        hole.point + (hole.radii[0] + d) * out + t * along + [0.0, 0.0, z]
-        for d in (0.0, 1e-3)
-        for t in (0.025, 0.03)
-        for z in (0.0, 0.01)
-    ]
-    beside = Hull("beside", np.array(corners))
-    (made,) = simulated_pieces(replace(solid, pieces=(*solid.pieces, beside)), 0.0)["beside"]
-    assert isinstance(made, Hull)
-    assert np.abs(made.center - beside.center).max() < 2.0 * SAGITTA_M
 
 
 @pytest.mark.parametrize("clearance_m", [0.0, 0.00025])

@@ -46,7 +46,9 @@ def aside(name, mm):
 
 
 def carried_out(plan, name, spiral, cache=None):
-    return replay_and_judge(plan, scene(name), layout(name).poses, config=ExecutionConfig("near-contact", spiral), cache=cache)
+    return replay_and_judge(
+        plan, scene(name), layout(name).poses, config=ExecutionConfig("near-contact", spiral), cache=cache
+    )
 
 
 def driven(law, push):

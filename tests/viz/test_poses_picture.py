@@ -27,14 +27,14 @@ def lifted() -> Observation:
 
 def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     seen = lifted()
-    found = poses_panel("as seen", seen, seen.poses, 3)
+    found = poses_panel("observed", seen, seen.poses, 3)
     assert found.gap_m == pytest.approx(SHIFT_M)
     wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
     assert found.open == wrong
     np.testing.assert_array_equal(found.poses["castle2"], seen.poses[1])
     mended = poses_panel("corrected", seen, correct(seen, "contact").poses, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
-    assert poses_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
+    assert poses_lines([mended]) == ["corrected: largest gap 0.000 mm; all contacts hold"]
 
 
 def test_disappeared_contacts_are_said_to_be() -> None:
@@ -42,7 +42,7 @@ def test_disappeared_contacts_are_said_to_be() -> None:
     seen = as_planned(scenario, 1.0, 1.0)
     goals = np.array(seen.poses)
     goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
-    found = poses_panel("as seen", seen, goals, len(goals))
+    found = poses_panel("observed", seen, goals, len(goals))
     assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)
 
 
@@ -52,8 +52,8 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     out = tmp_path / "seen.png"
     assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", "docs/seen.csv", "--out", str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith("as seen: largest gap 5.466 mm; open: ")
-    assert said[1:] == ["corrected by contact-robust: largest gap 0.000 mm; all hold", f"Wrote {out}"]
+    assert said[0].startswith("observed: largest gap 5.466 mm; open: ")
+    assert said[1:] == ["corrected by contact-robust: largest gap 0.000 mm; all contacts hold", "", f"Wrote {out}"]
     drawn = imageio.imread(out)
     left = drawn[60:530, :620]
     right = drawn[60:530, 620:1240]
@@ -64,7 +64,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("--step", "4"), "step 4 was given; the scenario has operations 1 to 3"),
+        (("--step", "4"), "--step must be from 1 to 3, got 4"),
         (
             ("--noise-level", "1", "--observation", "docs/seen.csv"),
             "--noise-level, which draws a trial, was given together with",
@@ -77,7 +77,7 @@ def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.Ca
     said = capsys.readouterr()
     assert part in said.err
     assert said.err.count("\n") == 1
-    assert not Path("believed.png").exists()
+    assert not Path("poses.png").exists()
 
 
 def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -87,11 +87,14 @@ def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFi
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     out = tmp_path / "x.png"
     assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", str(path), "--out", str(out)]) == 1
-    assert "operation 2 was not seen, so nothing is known after it; --seen --step 1 shows" in capsys.readouterr().err
+    assert (
+        "operation 2 was not observed, so the poses after it are unknown; --observed --step 1"
+        in capsys.readouterr().err
+    )
     assert not out.exists()
-    only = ("--seen", "--step", "1")
+    only = ("--observed", "--step", "1")
     assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", str(path), *only, "--out", str(out)]) == 0
-    assert capsys.readouterr().out.startswith("as seen: largest gap")
+    assert capsys.readouterr().out.startswith("observed: largest gap")
 
 
 @pytest.fixture
@@ -113,8 +116,8 @@ def test_what_speaks_against_a_correction_is_said(
     """Planes that coincide a metre apart are no contact."""
     asked = ["stick_in_tower", "--observation", str(far), "--method", "contact"]
     assert cli.main(["inspect", "poses", *asked, "--out", str(tmp_path / "far.png")]) == 0
-    _, corrected, assumed, _ = capsys.readouterr().out.splitlines()
-    assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: beside it")
+    _, corrected, assumed, *_ = capsys.readouterr().out.splitlines()
+    assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: no overlap")
     for said in (
         "the stated noise does not explain the correction (p = ",
         "foretold: operation 2 (castle2) will fail: ",

@@ -14,8 +14,8 @@ from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.simulation.hooks import Hooks, Phase
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_sensors_on
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
-from apo_bench.trial.trial import noise_of, run_trial
 
 _OF_ROW = MappingProxyType(
     {
@@ -23,7 +23,7 @@ _OF_ROW = MappingProxyType(
         "seed": "number of the trial",
         "method": "what made the plan",
         "noise": "model of the camera",
-        "noise_level": "of the noise, mm",
+        "noise_mm": "of the noise, mm",
         "noise_deg": "of the noise, degrees",
         "human_error_scale": "0 for a careful human, 1 for the scenario's",
         "success": "whether the assembly is right at the end; the judge's word",

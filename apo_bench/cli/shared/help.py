@@ -57,6 +57,8 @@ class Interrupted(Exception):
 class _WithExamples:
     """Writes the lines below `Examples:` of the help text at the end, each on its line."""
 
+    help: str | None
+
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self.help, _, self.examples = cleandoc(more["help"] or "").partition("\n\nExamples:\n")

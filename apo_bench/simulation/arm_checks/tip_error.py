@@ -7,6 +7,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, remembered
 from apo_bench.simulation.robot import ExecutionAborted, Robot, Trajectory, shifted, smooth, steady
+from apo_bench.simulation.robot.reach import along, limit_speed
 from apo_bench.simulation.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
@@ -51,9 +52,28 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
             rise(robot, SPEEDS[-1])
             way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
             line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
-            return error_on(line, robot.trace(line), speed)
+            return error_on(line, trace(robot, line), speed)
     except ExecutionAborted:
         return None
+
+
+def trace(robot: Robot, line: Trajectory) -> Array:
+    """Follow a line through free air; returns where the tip really is at each step, (n, 4, 4).
+
+    Raises:
+        ExecutionAborted: The line leaves the arm's reach.
+    """
+    kinematics = robot.scene.kinematics
+    line, knots = limit_speed(kinematics, line, robot.q, robot.arm.limits.speed_rad_s)
+    n = max(2, round(line.seconds / robot.step_s))
+    path = robot.reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), robot.q, knots))
+    tips = []
+    for q, velocity in list(zip(path, np.gradient(path, robot.step_s, axis=0), strict=True))[1:]:
+        robot.servo_step(q, velocity=velocity)
+        tips.append(robot.tip())
+    robot.q = path[-1]
+    robot.T = line.end
+    return np.array(tips)
 
 
 def rise(robot: Robot, speed: float) -> None:
@@ -64,7 +84,7 @@ def rise(robot: Robot, speed: float) -> None:
     if robot.scene.kinematics.inverse(up, robot.q) is None:
         up[2, 3] = robot.T[2, 3]
     if np.abs(up - robot.T).max() > 0.0:
-        robot.trace(smooth(robot.T, up, speed))
+        trace(robot, smooth(robot.T, up, speed))
     robot.wait(STAND_S)
     looks = 0
     while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:

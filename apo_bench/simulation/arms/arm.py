@@ -49,10 +49,6 @@ class Hand:
     """How hard each pad pushes on a part of half its opening."""
     squeeze_m: float
     """How far inside the part its fingers are sent for that, each."""
-    gives_m: float
-    """How far the middle of each pad then gives way, beyond the surface of that part."""
-    turns_deg: float
-    """How far a pad turns while the empty hand closes to half of its opening."""
     friction: float
     """Of what pushes on that part."""
     seconds: float
@@ -61,14 +57,10 @@ class Hand:
     """A geom of each side."""
     thick_m: float
     """How much farther apart the middles of these are than the surfaces that hold."""
-    reach: Array
-    """(n,), how far the pads reach beyond the tip, [m]."""
-    evenness: float = 1.0
-    """How hard the weaker pad pushes on that part, as a part of the stronger one."""
 
     def __post_init__(self) -> None:
         n = len(self.opening)
-        freeze(self, opening=(n,), reach=(n,), commands=(n, len(self.actuators)), states=(n, len(self.joints)))
+        freeze(self, opening=(n,), commands=(n, len(self.actuators)), states=(n, len(self.joints)))
 
     @cached_property
     def graded(self) -> bool:

@@ -51,7 +51,7 @@ def _last_link(model: Any, description: ArmDescription) -> int:
         body = moving[0]
     while body and (not model.body_jntnum[body] or (not moving and _is_jaw(model, body))):
         body = int(model.body_parentid[body])
-    require(body, f"{description.mjcf}: the arm has no joints; give the MJCF file of an arm.")
+    require(body, f"{description.model_file}: the arm has no joints; give the MJCF file of an arm.")
     return body
 
 
@@ -95,7 +95,7 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
     for j, name in zip(chain, names, strict=True):
         require(
             int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_HINGE),
-            f"{description.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.",
+            f"{description.model_file}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.",
         )
     if description.joints is not None:
         require(
@@ -106,7 +106,7 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
         names = [name for name in names if name in description.joints]
     require(
         _LEAST_JOINTS <= len(names) <= _MOST_JOINTS,
-        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
+        f"{description.model_file}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
         f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'.",
     )
     return names

@@ -54,7 +54,7 @@ class Rig(NamedTuple):
             quiet = quiet + 1 if np.abs(data.qvel[dof]).max() < _STILL else 0
         require(
             np.isfinite(data.qpos).all() and not data.warning.number.any(),
-            f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.",
+            f"{self.path}: the gripper is unstable when it is driven; correct its actuators or masses.",
         )
         mujoco.mj_kinematics(model, data)
         return STEP_S * steps

@@ -53,7 +53,7 @@ def with_force(
         return first, 1.0
     raise InputError(
         f"{path}, gripper: 'force_n' is {wanted_n:g}, and each pad pushes with {scaled.hand.force_n:.1f} N after its "
-        f"drive was made {times:.3g} times as strong; state what it can do, or mend its actuators."
+        f"drive was made {times:.3g} times as strong; state what it can do, or correct its actuators."
     )
 
 

@@ -145,29 +145,12 @@ class Robot:
         self.T = line.end
         return 0.0
 
-    def trace(self, line: Trajectory) -> Array:
-        """Follow a line through free air, and see where the tip really is at each step, (n, 4, 4).
-
-        Raises:
-            ExecutionAborted: The line leaves the arm's reach.
-        """
-        line, knots = limit_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
-        n = max(2, round(line.seconds / self.step_s))
-        path = self.reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
-        tips = []
-        for target in feedforward_command(path, np.gradient(path, self.step_s, axis=0), self._lead, self._stick)[1:]:
-            self._tick(self._commands(target[None]))
-            tips.append(self.tip())
-        self.q = path[-1]
-        self.T = line.end
-        return np.array(tips)
-
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
         for T in plan_waypoints(self.scene.kinematics, self.arm, self.T, end, self.q):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def servo_step(self, q: Array, passed: int, velocity: Array | None = None) -> list[float]:
+    def servo_step(self, q: Array, passed: int = 1, velocity: Array | None = None) -> list[float]:
         """One physics step towards joint angles, [rad], led by a velocity, [rad/s]; whenever a tick has passed, a look.
 
         Returns:

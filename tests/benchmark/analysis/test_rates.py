@@ -44,7 +44,7 @@ def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True,
         "scenario": "stick_in_tower",
         "clearance_mm": 0.25,
         "human_error_scale": 0.0 if method == "oracle" else 1.0,
-        "noise_level": 0.0 if method == "oracle" else 1.0,
+        "noise_mm": 0.0 if method == "oracle" else 1.0,
         "noise_deg": 0.0 if method == "oracle" else 1.0,
         "noise": "isotropic",
         "contact_source": "given",
@@ -236,7 +236,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
 
 def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
     """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
-    levels = ({"noise_level": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
+    levels = ({"noise_mm": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
     rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("uncorrected", "paper")]
     rows += [row("paper", clearance_mm=c, contact_source="false-negative") for c in (0.25, 1.0)]
     cells = tally(rows)

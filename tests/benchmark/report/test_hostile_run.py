@@ -17,8 +17,9 @@ from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
-from apo_bench.records.run.replay_command import own_code, replay_command
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.own_code import own_code
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
@@ -136,15 +137,16 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
-    from apo_bench.cli.trial_text import print_row
-    from apo_bench.trial.outcome_columns import result
+    from apo_bench.cli.shared import print_columns
+    from apo_bench.trial.endings import end_record
+    from apo_bench.viz.trial_text import summary_lines
 
-    end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
-    print_row(row("contact", 0, False, pose_source="noise-model") | end)
+    end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
+    print_columns(summary_lines(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
-    assert [one["sentence"] for one in read_rows(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
+    assert [one["sentence"] for one in read_records(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
 @pytest.mark.parametrize(

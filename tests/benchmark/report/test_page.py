@@ -16,7 +16,6 @@ import pytest
 
 from apo_bench.benchmark.report.report import Report, report
 from apo_bench.cli.app import main
-from apo_bench.cli.rates import print_report
 from apo_bench.errors import InputError
 from apo_bench.io import write_columns
 from tests import pages
@@ -48,7 +47,7 @@ def numbers(seed: int, method: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = write(tmp_path_factory.mktemp("page") / "run", rows())
-    keys = ("scenario", "method", "seed", "noise_level")
+    keys = ("scenario", "method", "seed", "noise_mm")
     lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
     text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
     (folder / "timing.jsonl").write_text(text, encoding="utf-8")
@@ -125,7 +124,7 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
         assert page.evaluate("navigator.clipboard.readText()") == want
         page.locator(".trials input").check()
-        failed = [r for r in rows() if (r["method"], r["noise_level"], r["success"]) == ("paper", 2.0, False)]
+        failed = [r for r in rows() if (r["method"], r["noise_mm"], r["success"]) == ("paper", 2.0, False)]
         assert lines.count() == len(failed)
         page.keyboard.press("Escape")
         assert button.get_attribute("aria-expanded") == "false"
@@ -237,8 +236,8 @@ def test_without_pyarrow_tables_are_csv_alone_and_it_is_said(
     assert {path.suffix for path in (tmp_path / "run" / "tables").iterdir()} == {".csv"}
     assert {path.name: path.read_bytes() for path in made.tables.values()} == kept
     assert ".parquet" not in made.page.read_text(encoding="utf-8")
-    print_report(made)
-    assert "as .parquet too with the package pyarrow" in " ".join(capsys.readouterr().out.split())
+    assert main(["report", str(tmp_path / "run"), "--pictures", "0"]) == 0
+    assert ".parquet needs the package pyarrow" in capsys.readouterr().out
     with pytest.raises(InputError, match="a Parquet table needs the package pyarrow; install it with: pip install"):
         write_columns(["a"], [[1]], tmp_path / "a.parquet")
 
@@ -294,7 +293,7 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))
-    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_level"] is not None for r in trials)
+    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_mm"] is not None for r in trials)
 
 
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
 TOWER = "stick_in_tower"

@@ -29,7 +29,7 @@ from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, with_contacts
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from tests.shipped import BOXES
 
 

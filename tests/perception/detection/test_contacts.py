@@ -19,7 +19,7 @@ from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
 from apo_bench.perception.observation.models.displaced import floored
 from apo_bench.scenario.file import scenario_names
-from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
+from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
 from tests import scenes
 
 NAMES = sorted(scenes.ALL)
@@ -164,7 +164,7 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
     scene = scenes.stick_on_castles()
     goals = np.array(scene.goals)
     goals[:, 2, 3] += [0.1, 0.2, 0.35]
-    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "detected")
+    seen = with_detected_contacts(stated(scenes.seen(scene, goals), 0.5), "detected")
     assert not seen.assembly.relations()
     assert correct(seen, "contact").ok
     assert correct(seen, "paper").ok

@@ -19,7 +19,7 @@ from apo_bench.perception.observation.observing import observe
 from apo_bench.scenario import draw_layout, is_named, nominal_operations, scenario_path
 from apo_bench.scenario.generated import FAMILIES, generate_assembly, whole_name, write_generated
 from apo_bench.scenario.parts import load_part
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 
 SMALL = (
     "generated:corners:2",

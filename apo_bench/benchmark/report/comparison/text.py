@@ -32,7 +32,7 @@ _WHERE = (
     Column("scenario", "scenario", "place.scenario", words=True),
     Column("conditions", "conditions", "place.conditions", words=True),
     Column("method", "method", "place.method", words=True),
-    Column("noise_level", "noise_level", "place.level_words", words=True),
+    Column("noise_mm", "noise level", "place.noise_words", words=True),
 )
 
 

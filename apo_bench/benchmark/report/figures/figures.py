@@ -106,8 +106,8 @@ def _recognised(lines: Sequence[Line]) -> list[Mark]:
         Mark(
             f"{what}; {line['noise']}, carelessness {line['human_error_scale']:g}",
             line["contact_source"],
-            (line["noise_level"], line["noise_deg"]),
-            noise_label(line["noise_level"], line["noise_deg"], line["noise"]),
+            (line["noise_mm"], line["noise_deg"]),
+            noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
             *[line[what]] * 3,
         )
         for line in [line for line in lines if line["scenario"] == ALL] or lines

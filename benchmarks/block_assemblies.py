@@ -1,6 +1,6 @@
-"""Assemblies of two to four blocks of random sizes, which no other benchmark counts; `promise.py` calibrates by them.
+"""Assemblies of two to four blocks of random sizes, by which predicted success is calibrated.
 
-They are as the block scenes of the benchmark: slots, rails, piles and steps; lengths in mm.
+They resemble the block scenarios of the benchmark: slots, rails, piles and steps. Lengths are in mm.
 """
 
 from __future__ import annotations
@@ -144,13 +144,13 @@ FAMILIES = (keyed, capped, piled, stepped, tunnelled)
 
 
 def blocks(seed: int) -> Assembled:
-    """One assembly; the same for the same seed."""
+    """Draw the assembly of a seed."""
     rng = np.random.default_rng([seed, 30])
     return FAMILIES[seed % len(FAMILIES)](lambda low, high: round(float(rng.uniform(low, high)), 1), rng)
 
 
 def scenario_of_blocks(seed: int, folder: Path) -> Path:
-    """The scenario file of one assembly, made without a hand."""
+    """Write the scenario file of the assembly of a seed."""
     poses = write(blocks(seed), folder)
     path = folder / f"blocks_{seed}.toml"
     made = draft(on_the_table(read_posed(poses)))

@@ -1,10 +1,9 @@
-"""Trials of `promise.py`: what a plan scored before it was carried out, and whether it succeeded; saved one by one."""
+"""Trials that measure predicted success: the score of a plan before its execution, and whether it succeeded."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +15,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import explanations, plan_score
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
@@ -25,27 +25,24 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     trial_outcome,
 )
-from apo_bench.trial.trial import noise_of, run_trial
+from benchmarks.block_assemblies import scenario_of_blocks
 from benchmarks.generated import scenario_of
-from benchmarks.promise_scenes import scenario_of_blocks
 
 CALIBRATION = "calibration"
 HELD_OUT = "held-out"
-NO_PLAN = "no_plan"
-"""In place of a code, where the method made no plan: nothing was promised."""
-SCENES = (
+NO_PLAN = "no_plan"  # code of a trial whose method made no plan
+SCENARIOS = (
     *("stick_in_tower", "vanished_fixture", "pocket_table", "carried_bridge", "block_on_block", "bridge_cycle"),
     *("stick_on_castles", "l_bracket_on_plate", "wedge_under_roof", "dovetail", "shaft_through_brackets"),
     *("peg_in_hole", "fixture_alignment", "nested_bushings"),
 )
-SLOW = ("gearbox",)
-"""Scenarios of every `EACH`th seed, since each of their trials takes as long as a dozen others."""
-EACH = 3
+SLOW = "gearbox"  # a trial takes as long as a dozen others
+EACH = 3  # SLOW has every third seed
 COLUMNS = ("set", "scenario", "seed", "method", "noise", "noise_mm", "robot_error", "success", "code", "score")
 
 
 class Condition(NamedTuple):
-    """What the trials of a cell have in common, besides the scenario."""
+    """The settings of a trial, but for its scenario."""
 
     method: str
     noise: str
@@ -68,8 +65,8 @@ CONDITIONS = (
 Line = Mapping[str, str]
 
 
-def lines_of(path: Path) -> list[Line]:
-    """The trials that were saved."""
+def read_lines(path: Path) -> list[Line]:
+    """Return the saved trials."""
     if not path.exists():
         return []
     with path.open(encoding="utf-8", newline="") as file:
@@ -77,7 +74,7 @@ def lines_of(path: Path) -> list[Line]:
 
 
 def save(path: Path, lines: Iterable[Line]) -> None:
-    """Add trials to a file."""
+    """Append trials to a file."""
     new = not path.exists()
     with path.open("a", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
@@ -86,10 +83,8 @@ def save(path: Path, lines: Iterable[Line]) -> None:
         writer.writerows(lines)
 
 
-def calibration_trials(folder: Path, kind: str, numbers: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
-    """All conditions of one generated assembly after the other.
-
-    An assembly that fails even by the truth has no trial.
+def run_calibration(folder: Path, kind: str, numbers: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
+    """Run all conditions of each generated assembly; one that `oracle` cannot build has no trial.
 
     Args:
         kind: `blocks`, or `generated`: with round parts, which take ten times as long.
@@ -109,11 +104,11 @@ def calibration_trials(folder: Path, kind: str, numbers: Iterable[int], known: I
             yield list(_trials(CALIBRATION, name, str(path), scene, seed))
 
 
-def held_out_trials(seeds: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
-    """All conditions of one scenario of the benchmark and one seed after the other."""
+def run_held_out(seeds: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
+    """Run all conditions of each scenario of the benchmark and seed."""
     there = {(line["scenario"], line["seed"]) for line in known}
     for seed in seeds:
-        for name in (*SCENES, *(SLOW if seed % EACH == 0 else ())):
+        for name in (*SCENARIOS, *(SLOW if seed % EACH == 0 else ())):
             if (name, str(seed)) not in there:
                 yield list(_trials(HELD_OUT, name, name, _scene(name), seed))
 
@@ -124,17 +119,16 @@ def _scene(scenario: str) -> Scene:
 
 
 def _settings(scenario: str, clearance_mm: float, seed: int, condition: Condition) -> TrialConfig:
-    noise_mm = condition.noise_mm
-    named = condition._asdict()
-    del named["noise_mm"]
     return TrialConfig(
         scenario,
-        noise_mm=noise_mm,
-        noise_deg=noise_mm,
+        method=condition.method,
+        noise=condition.noise,
+        noise_mm=condition.noise_mm,
+        noise_deg=condition.noise_mm,
+        robot_error=condition.robot_error,
         clearance_mm=clearance_mm,
         seed=seed,
         fidelity="near-contact",
-        **named,
     )
 
 
@@ -143,21 +137,17 @@ def _trials(kind: str, name: str, scenario: str, scene: Scene, seed: int) -> Ite
     simulated = simulate_demonstration(scene, first.human_error_scale, seed)
     cache = ReplayCache()
     for condition in CONDITIONS if simulated.demonstration.code == "ok" else ():
-        success, code, score = _trial(replace(first, **_fields(condition)), scene, simulated, cache)
-        cells = (kind, name, seed, *condition._replace(noise_mm=f"{condition.noise_mm:g}"), success, code, score)
-        yield dict(zip(COLUMNS, map(str, cells), strict=True))
-
-
-def _fields(condition: Condition) -> dict[str, object]:
-    fields = condition._asdict()
-    noise_mm = fields.pop("noise_mm")
-    return fields | {"noise_mm": noise_mm, "noise_deg": noise_mm}
+        settings = _settings(scenario, scene.clearance_mm, seed, condition)
+        success, code, score = _trial(settings, scene, simulated, cache)
+        place = (condition.method, condition.noise, f"{condition.noise_mm:g}", condition.robot_error)
+        values = (kind, name, str(seed), *place, success, code, score)
+        yield dict(zip(COLUMNS, values, strict=True))
 
 
 def _trial(
     settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, cache: ReplayCache
 ) -> tuple[str, str, str]:
-    """Success, code and score, as they are saved."""
+    """Return success, code and score, as they are saved."""
     seen: Observation = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed)
     made = apply_method(settings.method, seen, None, where=scene)
     if made.plan is None:
