@@ -31,7 +31,7 @@ of the world frame; what was not seen says so; what was seen reaches the robot b
 
 Tables show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part:
 their standard deviation, the one that observations state, and percentiles of their size. `apo-bench noise show NAME`
-prints a card, with `--noise-level` at another level.
+prints a sheet, with `--noise-level` at another level.
 """
 
 TRIALS = 200

@@ -31,14 +31,15 @@ def view_command(
     from apo_bench.viz.trial_text import summary_lines
     from apo_bench.viz.viewing import choose_display, view
 
+    is_sweep = Path(target).is_dir()
+    require(
+        is_sweep or (trial, secret_seed_file) == (None, None),
+        f"--trial and --secret-seed-file belong to the folder of a sweep, got {target}; leave them out.",
+    )
     display = choose_display(port)
-    if Path(target).is_dir():
+    if is_sweep:
         record, rollout = repeat_trial(Path(target), trial, secret_seed_file)
         print_columns(summary_lines(record, record["scenario"]))
     else:
-        require(
-            (trial, secret_seed_file) == (None, None),
-            f"--trial and --secret-seed-file belong to the folder of a sweep, got {target}; leave them out.",
-        )
         rollout = scenario_story(build_scene(load_scenario(target)))
     view(rollout, display, port, typer.echo)

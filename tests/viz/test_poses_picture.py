@@ -120,7 +120,7 @@ def test_what_speaks_against_a_correction_is_said(
     assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: no overlap")
     for said in (
         "the stated noise does not explain the correction (p = ",
-        "foretold: operation 2 (castle2) will fail: ",
+        "operation 2 (castle2) will fail: ",
     ):
         assert said in corrected
     assert assumed == "a standard deviation of 1 mm and 1 deg per axis, assumed where the file states none"
@@ -128,4 +128,4 @@ def test_what_speaks_against_a_correction_is_said(
     *_, assumed, wrong = capsys.readouterr().out.splitlines()
     assert assumed == "a standard deviation of 3 mm and 1 deg per axis, assumed where the file states none"
     assert wrong.startswith("the stated noise does not explain the correction (p = ")
-    assert "; foretold: operation 2 (castle2) will fail: " in wrong
+    assert "; predicted: operation 2 (castle2) will fail: " in wrong

@@ -101,7 +101,7 @@ def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
             feet = pose.apply(part, 1e-3 * np.array(laid["feet_in_part_mm"]))
             assert np.allclose(part, t.flat.T, atol=1e-9)
             assert feet @ n == pytest.approx(d, abs=1e-9)
-            for told, place in zip(laid["then_walls"], t.beside, strict=True):
+            for told, place in zip(laid["then_walls"], t.side_touches, strict=True):
                 begins = tip(told["from"], frames) @ matrix(laid["part_in_tip"])
                 n, d = plane(told, frames)
                 assert np.allclose(begins, place.T, atol=1e-9)

@@ -233,7 +233,7 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
         page.draw()
         assert cursor.place == place == server.gui.add_slider.return_value.value
     click("play / stop")
-    click("goals")
+    click("target poses")
     page.draw()
     assert (cursor.playing, cursor.shows_goals) == (True, True)
     click("play / stop")
