@@ -49,7 +49,7 @@ _EXPORTS = MappingProxyType(
         "build_scene": "apo_bench.simulation.scene.scene",
         "camera_view": "apo_bench.simulation.scene.render",
         "correct": "apo_bench.correction.correctors",
-        "correct_many": "apo_bench.correction.correctors",
+        "correct_many": "apo_bench.correction.batches",
         "demonstrate": "apo_bench.simulation.human.demonstration",
         "detect_contacts": "apo_bench.perception.detection.contacts",
         "evaluate": "apo_bench.benchmark.evaluation",

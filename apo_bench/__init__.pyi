@@ -11,9 +11,9 @@ from apo_bench.benchmark.evaluation import evaluate as evaluate
 from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
+from apo_bench.correction.batches import correct_many as correct_many
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
-from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
 from apo_bench.envs.flatten import Flatten as Flatten

@@ -14,7 +14,9 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Correction, Observation, Operation, largest, largest_gap, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.track import candidates, solve_own_contacts, track_operations
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
+from apo_bench.correction.baselines.track import track_operations
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 from apo_bench.geometry import Array

@@ -6,14 +6,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from apo_bench.benchmark.rate_table import RateTable
-from apo_bench.benchmark.session import SESSION, name_functions
-from apo_bench.benchmark.sweeps.grid import SweepConfig
+from apo_bench.benchmark.session import name_functions
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep
-from apo_bench.errors import require
+from apo_bench.errors import require, require_known
+from apo_bench.names import SESSION
 from apo_bench.records import TrialRecord
 
 Method = str | Callable[..., Any]
 """A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)` poses."""
+
+_AXES = tuple(info.name for info in AXES if info.name != "method")
 
 
 def evaluate(
@@ -45,6 +48,8 @@ def evaluate(
         InputError: An unknown setting, a value that is not allowed, or a function with more than one worker that cannot
             be imported.
     """
+    for name in settings:
+        require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))
     labelled = dict(_label(method, "method"))
     noises = dict(_label(settings.pop("noise", ()), "noise"))
     functions = {label: each for label, each in (labelled | noises).items() if callable(each)}

@@ -105,7 +105,7 @@ def correct_command(
 def _explain_solution(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected poses; None where contacts stay open, or of too many operations."""
     from apo_bench import explain
-    from apo_bench.correction.checks.status import gap_of
+    from apo_bench.correction.checks.as_given import gap_of
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
     if not correction.ok or 6 * len(correction.poses) > LARGEST_POSTERIOR:
@@ -125,7 +125,8 @@ def _find_corrector(method: str, doubt: str | None) -> Any:
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     from apo_bench.formats.csv_form import table
-    from apo_bench.formats.json_forms import plan_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.plan_json import plan_form
 
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)

@@ -79,7 +79,8 @@ def _import_for_scenario(
     log: Any, models: Any, camera: Any, tracks: Any, scenario: str, order: Any, out: Path, picture: Any, paths: Any
 ) -> None:
     from apo_bench import load_scenario
-    from apo_bench.formats.json_forms import observation_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.observation_json import observation_form
     from apo_bench.importers.recording.importing import import_recording
     from apo_bench.importers.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.importers.recording.show.text import PATH_HEAD, imported_lines, path_rows

@@ -31,13 +31,8 @@ from apo_bench.assembly import (
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.relation_equations import (
-    RelationHold,
-    SharedEstimate,
-    by_relation,
-    estimate_shared,
-    relation_holds,
-)
+from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
+from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
 from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearised_by, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Correction, Observation, project_observation
+from apo_bench.correction.contact.drawn import drawn_radius
 from apo_bench.correction.contact.problem import seen_system
-from apo_bench.correction.contact.solved import drawn_radius
 from apo_bench.correction.solvers import coordinates_of, freedom_of, linearised_by, noise_factor
 from apo_bench.geometry import Array, pose, right_jacobian
 

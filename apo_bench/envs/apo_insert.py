@@ -297,7 +297,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         shared = 0.0
         try:
             self._move(control, given)
-            self._best = min(before, -float(control.feel.tip[2]))
+            self._best = min(before, -float(control.reading.tip[2]))
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
         except ExecutionAborted as aborted:

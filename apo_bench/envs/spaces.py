@@ -126,7 +126,7 @@ def insert_observation(
         left: How many actions are left.
         action: (7,), the last one.
     """
-    feel = control.feel
+    feel = control.reading
     way = (-1e3 * float(feel.tip[2]), 1e3 * best, PERIOD_S * left)
     seen: dict[str, Any] = {
         "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],

@@ -1,6 +1,6 @@
 """Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
 
-from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
+from apo_bench.geometry.arrays import Array, Ints, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces, receded_pieces
 from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
 from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
@@ -54,7 +54,6 @@ __all__ = (
     "Hull",
     "Ints",
     "Mate",
-    "NotReal",
     "Overlap",
     "PadPlace",
     "Piece",

@@ -68,7 +68,7 @@ class ContactVerdict(NamedTuple):
 
 
 class ContactJudge(NamedTuple):
-    """What is asked of a contact, whatever the moment."""
+    """The limits of a contact, at any moment."""
 
     assembly: Assembly
     thresholds: Thresholds
@@ -84,12 +84,12 @@ class ContactJudge(NamedTuple):
             poses: Where the parts are, world frame, [m].
             true: Where they are when it is made, if all goals are the true ones.
         """
-        asks = self.thresholds
-        gaps, angle, common = _measured(self.assembly, contact, poses)
+        limits = self.thresholds
+        gaps, angle, common = _measure(self.assembly, contact, poses)
         allowed, gap = self._nearest_limit(contact, operation, true, gaps)
         covered = share(common, face_overlap(self.assembly, contact, true))
-        covering = gap is not None and covered >= asks.overlap_fraction
-        near = angle <= asks.loose_angle_deg and (gap is None or gap <= asks.loose_gap_mm)
+        covering = gap is not None and covered >= limits.overlap_fraction
+        near = angle <= limits.loose_angle_deg and (gap is None or gap <= limits.loose_gap_mm)
         return ContactVerdict(
             contact,
             operation,
@@ -130,7 +130,9 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
     if bare:
         worst = min(bare, key=lambda c: c.overlap)
         true = "length" if worst.kind in ("shaft in hole", "cone in cone", "shaft on plane") else "overlap"
-        how = f"{100 * worst.overlap:.0f} % of the true {true}, where {100 * thresholds.overlap_fraction:g} % are asked"
+        how = (
+            f"{100 * worst.overlap:.0f} % of the true {true}, where {100 * thresholds.overlap_fraction:g} % are needed"
+        )
         yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
 
 
@@ -159,7 +161,7 @@ def _when(verdict: ContactVerdict) -> str:
     return f" after operation {verdict.operation + 1}" if verdict.moment == "made" else ""
 
 
-def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps | None, float, Overlap]:
+def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps | None, float, Overlap]:
     """What is between the faces, angle between the normals or axes [degrees], and the overlap.
 
     Round faces are off, not apart or deep, but for shafts on planes.

@@ -44,7 +44,7 @@ def displacements(
 def faults_of_place(
     assembly: Assembly, after: _After, final: Snapshot, away: Collection[str], seen: Poses
 ) -> Iterator[tuple[str, float]]:
-    """What moved and tells in the finished assembly: two parts in words, and how far a corner of either moved, [m].
+    """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
 
     Two movable parts that touch at the end: against each other, along what their contacts leave free, since the later
     of their last operations; but no farther than one of them moved in the room since its own. A part whose contacts

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, placements
 from apo_bench.geometry import Array, Overlap, nearest_alike
-from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Share, face_overlap
+from apo_bench.judging.contacts import ContactJudge, Share, face_overlap
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records import Thresholds
@@ -18,7 +18,7 @@ def judge_finished(
 ) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
-    Asked for are the contacts that stand at the end. A part may have been put in by any of its symmetries: the one
+    The contacts that stand at the end are needed. A part may have been put in by any of its symmetries: the one
     nearest in rotation to its true final pose counts, for all its contacts. On a fixed part the area of the overlap
     counts, wherever it is, so that an assembly that is right in itself may stand elsewhere on the table; between
     movable parts the overlap has its place on the environment face. Where fixtures end is free. Parts that touch at the
@@ -33,11 +33,12 @@ def judge_finished(
     all_made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
     if final is None:
         return judgement((), (), (), thresholds, all_made=False)
+    judge = ContactJudge(assembly, thresholds, clearance_mm)
     away = fixtures(assembly)
     true = placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
     return judgement(
-        tuple(_standing_contacts(ContactJudge(assembly, thresholds, clearance_mm), seen, true, away)),
+        tuple(judge.verdict(contact, k, "end", seen, true, share) for contact, k, share in _standing(assembly, away)),
         [final],
         [(what, 1e3 * m) for what, m in faults_of_place(assembly, reached.after, final, away, seen)],
         thresholds,
@@ -66,12 +67,6 @@ def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k:
 
 def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
     return any(end.part in assembly.fixed for end in contact)
-
-
-def _standing_contacts(judge: ContactJudge, seen: Poses, true: Poses, away: frozenset[str]) -> Iterator[ContactVerdict]:
-    """The contacts that stand at the end, of parts that are no fixtures."""
-    for contact, made, share in _standing(judge.assembly, away):
-        yield judge.verdict(contact, made, "end", seen, true, share)
 
 
 def _standing(assembly: Assembly, away: frozenset[str]) -> Iterator[tuple[Contact, int, Share]]:

@@ -23,7 +23,7 @@ class Judgement:
     """The faults of an assembly by one rule."""
 
     loose: bool
-    """Every operation ended, and every contact that is asked for is there within millimetres and degrees."""
+    """Every operation ended, and every needed contact is there within millimetres and degrees."""
     conditions: Mapping[str, bool]
     """Each of `FAULTS`, in that order: whether it was found."""
     why: str
@@ -62,7 +62,7 @@ def judgement(
     """Compare what was measured with the thresholds.
 
     Args:
-        contacts: The contacts that are asked for.
+        contacts: The contacts that the rule needs.
         states: The snapshots in which nothing may be inside anything, held or moving.
         pushes: Part, and how far it was pushed [mm], by what the rule minds.
         all_made: Whether every operation ended and there is a snapshot of the end.

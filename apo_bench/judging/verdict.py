@@ -38,12 +38,12 @@ class Verdict:
 
     @property
     def loose_success(self) -> bool:
-        """Every contact that `success` asks for is there within millimetres and degrees; implied by `success`."""
+        """Every contact that `success` needs is there within millimetres and degrees; implied by `success`."""
         return self.rests_on.loose
 
     @property
     def rests_on(self) -> Judgement:
-        """The faults and numbers behind `success`: those of the stricter rule where it is asked for and fails."""
+        """The faults and numbers behind `success`: those of the stricter rule where it applies and fails."""
         strict = self.meaning == "as_demonstrated" and (self.finished.holds or not self.demonstrated.holds)
         return self.demonstrated if strict else self.finished
 
@@ -59,7 +59,7 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
             apart faces may be, and which of a part's symmetries is meant.
     """
     reference = frozen(reference, len(assembly), 4, 4)
-    sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
+    sound = Reached(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
     return Verdict(
         criteria.success_means,
         finished=judge_finished(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),
@@ -67,7 +67,7 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
     )
 
 
-def _sound(snapshot: Snapshot | None) -> Snapshot | None:
+def _drop_non_finite(snapshot: Snapshot | None) -> Snapshot | None:
     """The snapshot, unless a pose in it is not finite."""
     if snapshot is None or not all(np.isfinite(T).all() for T in snapshot.poses.values()):
         return None

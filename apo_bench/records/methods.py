@@ -15,7 +15,7 @@ CORRECTORS = MappingProxyType(
         "paper": "apo_bench.correction.baselines.paper:paper",
         "paper-track": "apo_bench.correction.baselines.track:paper_track",
         "snap": "apo_bench.correction.baselines.snap:snap",
-        "least-squares": "apo_bench.correction.baselines.penalty:least_squares",
+        "least-squares": "apo_bench.correction.baselines.least_squares:least_squares",
         "penalty": "apo_bench.correction.baselines.penalty:penalty",
     }
 )

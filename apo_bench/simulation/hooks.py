@@ -1,4 +1,4 @@
-"""One list of hooks: what is called while hands demonstrate or a robot replays. Whoever is called changes nothing."""
+"""Hooks: functions that a demonstration or a replay calls; they change nothing."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 BY_HAND = "by hand"
 TOUCHING = "touch"
-"""What is done by hands, and by a robot that feels before it takes anything: nothing is in its hand."""
+"""Phases with an empty hand: a demonstration, and a robot that probes before it picks anything."""
 
 
 class Phase(NamedTuple):
-    """What is done at one moment."""
+    """What hands or robot do at one moment."""
 
     operation: int | None
     """From 0; None before the first begins."""
@@ -28,7 +28,7 @@ class Phase(NamedTuple):
 
 
 def _nothing(_: Any) -> None:
-    """What is called where nobody wants to know."""
+    """The hook by default."""
 
 
 @final

@@ -7,7 +7,8 @@ import numpy as np
 
 from apo_bench.assembly import Hypothesis, spell
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation
-from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
+from apo_bench.correction.relation_equations import RelationHold
+from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
 from apo_bench.geometry import Array
 from apo_bench.io import grouped, listed_words, with_article

@@ -25,7 +25,7 @@ from apo_bench.simulation.execution.probing.places import (
     wall_places,
 )
 from apo_bench.simulation.execution.probing.state import FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
-from apo_bench.simulation.robot import felt_noise, low_pass_part
+from apo_bench.simulation.robot import filtered_noise, low_pass_part
 from apo_bench.simulation.scene import Scene
 from apo_bench.viz.robot_form import pose_form, tip_form
 
@@ -40,7 +40,7 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
         InputError: An unknown sensor.
     """
     noise = ft_noise(sensor)
-    felt = felt_noise(noise, low_pass_part())
+    felt = filtered_noise(noise, low_pass_part())
     guard = touch_guard(felt.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
     return {

@@ -13,10 +13,10 @@ from apo_bench import ContactCorrector, Correction, InputError, Observation, cor
 from apo_bench.assembly import Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
+from apo_bench.correction.batches import BATCH
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.correctors import BATCH
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.play import project_vertices
+from apo_bench.correction.solvers.projected_contacts import project_vertices
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.checks.test_consistency import shifted

@@ -65,7 +65,7 @@ MISBEHAVED = {
     "raises": r"it raised ZeroDivisionError\(<object object at 0x\.\.\.>\)",
     "halves": r"half a letter: \? and \\x1b\[31m red",
     "nonsense": "returned a str",
-    "imaginary": "returned complex numbers as goals; return real ones",
+    "imaginary": "returned complex numbers as poses; return real ones",
     "wide": r"a position of 1e\+09 m",
     "odd": "the corrector 'users:odd' failed: freed of Correction must be a list",
     "red": r"returned '\\x1b\[31m red' as its sentence",

@@ -8,7 +8,7 @@ import pytest
 from apo_bench import InputError, read_arm
 from apo_bench.io import named_files
 from apo_bench.resources import folder
-from apo_bench.simulation.arms.loading import compiled, load_model
+from apo_bench.simulation.arms.loading import compile_model, load_model
 
 ARMS = folder("assets") / "arms"
 WORLD = "<worldbody>"
@@ -35,7 +35,7 @@ URDF = """<robot name="two"><link name="base"/>
 
 def test_a_urdf_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
-    model = compiled(load_model(tmp_path / "arm.urdf", "arm"), tmp_path)
+    model = compile_model(load_model(tmp_path / "arm.urdf", "arm"), tmp_path)
     assert [model.joint(j).name for j in range(model.njnt)] == ["joint1"]
 
 
@@ -91,7 +91,7 @@ def test_a_mesh_that_is_stated_twice_is_read_once_as_robosuite_does(tmp_path: Pa
         '<asset><mesh file="link.obj"/><mesh file="link.obj" scale="2 2 2"/></asset>'
         '<worldbody><body><geom type="mesh" mesh="link"/></body></worldbody></mujoco>'
     )
-    model = compiled(load_model(tmp_path / "arm.xml", "arm"), tmp_path)
+    model = compile_model(load_model(tmp_path / "arm.xml", "arm"), tmp_path)
     assert model.nmesh == 1
     assert model.mesh_vert.max() < 1.0
 

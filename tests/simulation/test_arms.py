@@ -16,7 +16,7 @@ from apo_bench.simulation.arm_checks.arm_check import check_arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import smooth
+from apo_bench.simulation.robot.paths import smooth_trajectory
 from apo_bench.simulation.robot.reach import along, follow_waypoints, limit_speed, plan_waypoints
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.viz.arm_text import check_lines
@@ -134,7 +134,7 @@ def test_a_line_takes_as_long_as_the_joints_need() -> None:
     q = np.array(arm.home)
     end = kinematics.forward(q)
     end[:3, 3] += (0.1, 0.2, -0.1)
-    line = smooth(kinematics.forward(q), end, 5.0)
+    line = smooth_trajectory(kinematics.forward(q), end, 5.0)
     most = np.full(6, 0.5)
     slower, knots = limit_speed(kinematics, line, q, most)
     t = np.linspace(0.0, 1.0, 201)

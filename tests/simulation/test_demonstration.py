@@ -13,7 +13,7 @@ from apo_bench.assembly import placements
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.robot.paths import shifted, smooth
+from apo_bench.simulation.robot.paths import smooth_trajectory, translate
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 CLEARANCE_MM = 0.25
@@ -121,7 +121,7 @@ def test_who_watches_sees_a_picture_every_period_also_of_what_is_left_out():
     layout = shown("stick_in_tower", 1.0, 2).layout
     pictures = Pictures(its.shown.qpos["stick"])
     hands = Hands(its, layout.start, pictures)
-    lift = smooth(hands.grab(0, "stick"), shifted(layout.start["stick"], (0, 0, 1), 0.4), 0.9)
+    lift = smooth_trajectory(hands.grab(0, "stick"), translate(layout.start["stick"], (0, 0, 1), 0.4), 0.9)
     hands.move((0, lift))
     hands.wait(0.2)
     times, places = map(np.array, zip(*pictures.seen, strict=True))

@@ -15,7 +15,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
 from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
-from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted
+from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, translate
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose
 from apo_bench.trial.stages import simulate_demonstration
@@ -176,7 +176,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
     left_out = 0
     for _ in range(60):
         start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
-        end = shifted(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
+        end = translate(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
         line = Trajectory(start, end, 0.2, np.asarray)
         s = np.linspace(0.0, 1.0, 201)
         spans = obstacles.near_spans(its, data, hand, ("stick",), line, s)
@@ -203,7 +203,7 @@ def test_nothing_is_left_out_while_something_moves():
     its = scene()
     data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
-    line = Trajectory(shifted(stick, (0, 0, 1), 0.2), shifted(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
+    line = Trajectory(translate(stick, (0, 0, 1), 0.2), translate(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
     s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
     hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
     assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == []

@@ -5,7 +5,7 @@ import numpy as np
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.film.caption import ABOVE_PX, BELOW_PX, Caption, add_caption
-from apo_bench.simulation.film.film import frames, operation_words, sampled
+from apo_bench.simulation.film.film import frames, operation_words, sample_moments
 from apo_bench.simulation.film.track import FilmMoment, FilmTrack, Segment
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Phase
 
@@ -18,7 +18,7 @@ def moments(*forces: float) -> list[FilmMoment]:
 
 
 def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
-    samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sampled(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
+    samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sample_moments(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
     assert samples == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
 
 

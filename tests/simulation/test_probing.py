@@ -17,7 +17,7 @@ from apo_bench.simulation.execution.probing.state import ProbingState, touch_gua
 from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
+from apo_bench.simulation.robot.wrist import filtered_noise, low_pass_part
 from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
 
@@ -103,7 +103,7 @@ def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_a
 
 
 def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
-    felt = felt_noise(ft_noise("10/5"), low_pass_part())
+    felt = filtered_noise(ft_noise("10/5"), low_pass_part())
     assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 

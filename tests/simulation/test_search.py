@@ -16,7 +16,7 @@ from apo_bench.simulation.execution.search import RADIUS_M, press_in
 from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
 from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.robot.paths import shifted, steady
+from apo_bench.simulation.robot.paths import steady_trajectory, translate
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
@@ -161,9 +161,9 @@ def test_two_searches_in_one_motion_bring_every_pose_to_where_the_second_ended(m
     monkeypatch.setattr(search, "search_hole", lambda *_: next(steps))
     monkeypatch.setattr(search, "_ease_in", lambda *_: np.zeros(3))
     end = pose.at((0.0, 0.0, 0.1))
-    stopped = shifted(end, DOWN, -0.01)
+    stopped = translate(end, DOWN, -0.01)
     robot = SimpleNamespace(T=stopped, macro="insert-into", follow=lambda line, guard: 0.01)
     grip = Grip(np.eye(4), 0.01)
     transfer = SimpleNamespace(front=np.zeros(3), slide_n=1.0)
-    _, T_search = press_in(robot, transfer, grip, steady(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
+    _, T_search = press_in(robot, transfer, grip, steady_trajectory(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
     assert T_search == pytest.approx(second @ first)

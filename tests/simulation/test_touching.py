@@ -13,7 +13,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, wrist_of, zero
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.in_hand import weld
-from apo_bench.simulation.robot.paths import shifted, smooth, steady
+from apo_bench.simulation.robot.paths import smooth_trajectory, steady_trajectory, translate
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import READING_S, WristSensor, part_loads
@@ -37,7 +37,7 @@ def empty_hand(scene: Scene, name: str, z: float, seed: int = 1) -> tuple[Robot,
     T[:3, 3] = 0.1, 0.16, 0.2
     robot.go(T, 0.8)
     zero(robot, wrist)
-    robot.follow(smooth(robot.T, shifted(robot.T, DOWN, 0.2 - z), 0.3))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, DOWN, 0.2 - z), 0.3))
     robot.stand()
     return robot, wrist
 
@@ -61,7 +61,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     T[:3, 3] = 0.1 + along, 0.16, 0.15
     robot.go(T, 0.8)
     zero(robot, wrist)
-    robot.follow(smooth(T, shifted(T, DOWN, 0.138), 0.2))
+    robot.follow(smooth_trajectory(T, translate(T, DOWN, 0.138), 0.2))
     if grasp == "friction":
         robot.forces.handle("stick")
         robot.fingers(0.01 - robot.arm.squeeze_m)
@@ -72,7 +72,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     robot.stand()
     T_tip_stick = pose.inverse(robot.tip()) @ part_pose(scene.work, robot.data, "stick")
     wrist.hold(*part_loads(scene, {"stick": T_tip_stick}))
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, lift), 0.2))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, lift), 0.2))
     robot.stand()
     return robot, wrist, T_tip_stick
 
@@ -109,10 +109,10 @@ def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with allow_sleep(scene.work, asleep):
         robot, wrist = empty_hand(scene, "wrist", 0.014)
-        left = press(robot, steady(robot.T, shifted(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
+        left = press(robot, steady_trajectory(robot.T, translate(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
         assert left is not None
         assert robot.wrist is None
-        assert np.linalg.norm(robot.T[:3, 3] - shifted(robot.T, UP, 0.0)[:3, 3]) == 0.0
+        assert np.linalg.norm(robot.T[:3, 3] - translate(robot.T, UP, 0.0)[:3, 3]) == 0.0
         reach = max(box.center[2] + box.half[2] for box in gripper_boxes(scene.kinematics, scene.arm, 0.002))
         assert robot.T[2, 3] == pytest.approx(reach, abs=5e-5)
         assert left == pytest.approx(robot.T[2, 3] - 0.004, abs=1e-4)
@@ -212,7 +212,7 @@ def test_an_offset_in_six_directions_is_gone_to(arm: str) -> None:
     steps = iter([*(goal * k / 1000 for k in range(1, 1001)), None])
     comply(robot, lambda _: next(steps), about, wrist)
     wanted = pose.at(about) @ pose.exp([0, 0, 0, *goal[3:]]) @ pose.inverse(pose.at(about)) @ start
-    wanted = shifted(wanted, goal[:3], 1.0)
+    wanted = translate(wanted, goal[:3], 1.0)
     off = pose.log(pose.inverse(wanted) @ robot.T)
     assert np.abs(off[:3]).max() < 5e-5
     assert np.degrees(np.abs(off[3:]).max()) < 0.01

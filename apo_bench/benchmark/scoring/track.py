@@ -62,8 +62,8 @@ class TrackTable(Table, frozen=True, kw_only=True):
     title: Text
     overall: bool = True
     quick_trials: Annotated[int, Meta(ge=1)] = 1
+    # msgspec 0.22 frees the pattern of `Text` twice where it is one of several types, so one name is a plain `str`.
     arms: str | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
-    """A pattern in a union with a tuple makes msgspec free it twice."""
 
 
 def seen_by(track: Track, estimator: str) -> Track:

@@ -1,4 +1,4 @@
-"""What is believed of a robot that may be wrong, how sure that is, and which commands make up for it."""
+"""The estimate of a robot's calibration errors from touches, its covariance, and the commands that make up for them."""
 
 from dataclasses import dataclass, replace
 from typing import final
@@ -6,22 +6,22 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import ProbingResult
-from apo_bench.assembly.touch import Touch, checked_array, checked_pose
-from apo_bench.correction.calibration.robust_estimate import (
+from apo_bench.assembly.touch import Touch, checked_pose
+from apo_bench.correction.calibration.robot_model import (
     HAND_EYE,
     TOOL,
-    NumberedTouch,
     Places,
     grasp_in,
     hand_eye_displacement,
     joints_in,
     part_poses,
-    robust_estimate,
     tip_displacement,
 )
+from apo_bench.correction.calibration.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.errors import kind, require
-from apo_bench.geometry import Array, copyable, freeze, pose
+from apo_bench.geometry import Array, copyable, freeze, frozen, pose
 from apo_bench.records.robot_error import Sigmas
 
 UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
@@ -46,7 +46,7 @@ class RobotEstimate:
     """(u,), [m, rad]."""
     covariance: Array
     """(u, u), to first order: with `UNKNOWN` regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
-    5 um, where what the robot's errors make to second order is no longer small (`benchmarks/touches.py`)."""
+    5 um, where what the robot's errors make to second order is no longer small."""
     felt: tuple[NumberedTouch, ...] = ()
     """All touches so far, with the grasps that they are of."""
     taken: tuple[bool, ...] = ()
@@ -58,17 +58,17 @@ class RobotEstimate:
 
     @property
     def hand_eye(self) -> Array:
-        """Where the robot is believed to go, (4, 4), for what it takes to be the world's frame, [m]."""
+        """The estimated displacement from the world's frame of the robot to the true one, (4, 4), [m]."""
         return hand_eye_displacement(self.mean, self.middle)
 
     @property
     def tool(self) -> Array:
-        """How far the tip is believed to be off on the hand, (3,), in its own frame, [m]."""
+        """The estimated shift of the tip on the hand, (3,), in its own frame, [m]."""
         return self.mean[TOOL]
 
     @property
     def encoders(self) -> Array:
-        """How far each joint is believed to be off what its encoder says, (joints,), [rad]."""
+        """The estimated offset of each joint from its encoder, (joints,), [rad]."""
         return self.mean[joints_in(self.joints)]
 
     @property
@@ -83,32 +83,20 @@ class RobotEstimate:
 
     @property
     def found(self) -> ProbingResult:
-        """What has been found out, in short."""
-        sure = self.deviation_mm, self.deviation_deg
-        return ProbingResult(len(self.touches), len(self.refused), self.felt_mm, self.felt_deg, *sure)
-
-    @property
-    def felt_mm(self) -> float:
-        """How far hand and eye are believed to be apart at the middle, [mm]."""
-        return float(1e3 * np.linalg.norm(pose.exp(self.mean[HAND_EYE])[:3, 3]))
-
-    @property
-    def felt_deg(self) -> float:
-        """By which angle they are believed to be turned, [deg]."""
-        return float(np.degrees(np.linalg.norm(self.mean[HAND_EYE][3:])))
-
-    @property
-    def deviation_mm(self) -> float:
-        """Root mean square of what `felt_mm` is off, as a vector, [mm]."""
-        return float(1e3 * np.sqrt(np.trace(self.covariance[HAND_EYE, HAND_EYE][:3, :3])))
-
-    @property
-    def deviation_deg(self) -> float:
-        """Root mean square of what `felt_deg` is off, as a vector, [deg]."""
-        return float(np.degrees(np.sqrt(np.trace(self.covariance[HAND_EYE, HAND_EYE][3:, 3:]))))
+        """What has been found out, in short: how far hand and eye are apart, and how uncertain that is."""
+        xi = self.mean[HAND_EYE]
+        variances = self.covariance[HAND_EYE, HAND_EYE].diagonal()
+        return ProbingResult(
+            touches=len(self.touches),
+            refused=len(self.refused),
+            mm=float(1e3 * np.linalg.norm(pose.exp(xi)[:3, 3])),
+            deg=float(np.degrees(np.linalg.norm(xi[3:]))),
+            sure_mm=float(1e3 * np.sqrt(variances[:3].sum())),
+            sure_deg=float(np.degrees(np.sqrt(variances[3:].sum()))),
+        )
 
     def grasp(self, number: int, sigmas: ArrayLike) -> "RobotEstimate":
-        """A part was grasped; a grasp of the same number is over, but what was felt with it is kept.
+        """A part was grasped; a grasp of the same number is over, but its touches are kept.
 
         Args:
             sigmas: (6,): how far it may have moved in the hand, a twist in the frame of the tip, [m, rad]; 0 is exact.
@@ -128,7 +116,7 @@ class RobotEstimate:
         )
 
     def touch(self, *touches: Touch) -> "RobotEstimate":
-        """What is believed after further touches, from all of them and the priors.
+        """Update the estimate by further touches, from all of them and the priors.
 
         Raises:
             InputError: No touch, one of a grasp that was not made, or with a Jacobian of other joints.
@@ -141,7 +129,7 @@ class RobotEstimate:
         return replace(self, mean=mean, covariance=covariance, felt=felt, taken=tuple(taken.tolist()))
 
     def real(self, T_world_tip: ArrayLike, jacobian: ArrayLike | None = None) -> Array:
-        """Where the tip really is, (4, 4), if the robot believes it at `T_world_tip`, (4, 4), [m]."""
+        """Where the tip really is, (4, 4), if the robot assumes it at `T_world_tip`, (4, 4), [m]."""
         B = checked_pose("pose of the tip", T_world_tip)
         offset = tip_displacement(self.mean, self._jacobian(jacobian))
         return hand_eye_displacement(self.mean, self.middle) @ B @ offset
@@ -153,7 +141,7 @@ class RobotEstimate:
         return pose.inverse(hand_eye_displacement(self.mean, self.middle)) @ X @ pose.inverse(offset)
 
     def held(self, grasp: int, T_tip_part: ArrayLike) -> Array:
-        """Where a part really lies in the frame of the tip, (4, 4), that was believed at `T_tip_part`, (4, 4)."""
+        """Where a part really lies in the frame of the tip, (4, 4), that the robot assumes at `T_tip_part`, (4, 4)."""
         gamma = self.mean[grasp_in(self.joints, self._grasp(grasp))]
         return pose.exp(gamma) @ checked_pose("pose of the part in the hand", T_tip_part)
 
@@ -201,32 +189,26 @@ class RobotEstimate:
 
     def _jacobian(self, jacobian: ArrayLike | None) -> Array:
         """(6, joints): zeros if none was given."""
-        return np.zeros((6, self.joints)) if jacobian is None else checked_array("Jacobian", jacobian, 6, self.joints)
+        return np.zeros((6, self.joints)) if jacobian is None else frozen(jacobian, 6, self.joints)
 
 
+@check_arguments
 def prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
-    """What is believed before the first touch: a robot that is right, as surely as is stated.
+    """The estimate before the first touch: no error, with the stated standard deviations.
 
     Args:
         sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where nobody states them.
         joints: How many joints the arm has.
         middle: (3,), [m], world frame: the mean of the goals.
     """
-    require(
-        isinstance(sigmas, Sigmas),
-        f"{kind(sigmas)} was given as sigmas; give UNKNOWN, or apo_bench.records.robot_sigmas('hand_eye:1/0.2').",
-    )
-    whole = isinstance(joints, int | np.integer) and joints >= 0
-    require(whole, f"{joints} joints were given; give the number of joints of the arm.")
+    require(joints >= 0, f"{joints} joints were given; give the number of joints of the arm.")
     mm, deg = sigmas.hand_eye
     prior = np.zeros(joints_in(joints).stop)
     prior[HAND_EYE] = np.repeat([1e-3 * mm, np.radians(deg)], 3)
     prior[TOOL] = 1e-3 * sigmas.tool_mm
     prior[joints_in(joints)] = np.radians(sigmas.joints_deg)
     checked = _checked_sigmas(prior, len(prior))
-    return RobotEstimate(
-        checked_array("middle", middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2)
-    )
+    return RobotEstimate(frozen(middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2))
 
 
 def slip_sigmas(sigmas: Sigmas) -> Array:
@@ -236,6 +218,6 @@ def slip_sigmas(sigmas: Sigmas) -> Array:
 
 
 def _checked_sigmas(sigmas: ArrayLike, n: int) -> Array:
-    checked = checked_array("standard deviations", sigmas, n)
+    checked = frozen(sigmas, n)
     require((checked >= 0.0).all(), f"a standard deviation of {checked.min():g} was given; 0 or more is allowed.")
     return checked

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import TEST_LEVEL, fit_deviation
+from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
     CompactEquations,
     Inequalities,

@@ -17,21 +17,12 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, faces_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import CONTRADICTION_M, fit_deviation, p_value
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
+from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import problem_of, seen_system
-from apo_bench.correction.contact.solved import drawn_chi_squares, drawn_p_value
-from apo_bench.correction.robust.beliefs import (
-    DISPLACED,
-    INLIER,
-    ROOM,
-    VIEW,
-    State,
-    States,
-    says_nothing,
-    together,
-)
+from apo_bench.correction.robust.beliefs import DISPLACED, INLIER, ROOM, VIEW, State, States, says_nothing, together
 from apo_bench.correction.robust.noise_scale import (
     LEAST,
     likeliest_scale,

@@ -18,22 +18,14 @@ from apo_bench.assembly import (
     largest_gap,
     project_observations,
 )
-from apo_bench.correction.checks.status import TEST_LEVEL, refused_correction
+from apo_bench.correction.checks.chi_square import TEST_LEVEL
+from apo_bench.correction.checks.status import refused_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import inferred_goals
-from apo_bench.correction.robust.beliefs import (
-    BROAD,
-    DISPLACED,
-    FLIPPED,
-    GROSS,
-    INLIER,
-    SHIFTED,
-    STALE,
-    States,
-    mode_covariance,
-)
+from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
+from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import looked_again, views_of

@@ -1,14 +1,7 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearised_by
-from apo_bench.correction.solvers.gauss_newton import (
-    LARGEST_DENSE,
-    SMALLEST,
-    NearestGoals,
-    batch_goals,
-    descended,
-    nearest_goals,
-)
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestGoals, batch_goals, nearest_goals
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,
@@ -19,7 +12,8 @@ from apo_bench.correction.solvers.inequalities import (
 )
 from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
-from apo_bench.correction.solvers.play import ProjectedContacts, fit_covariance, plays, project_vertices
+from apo_bench.correction.solvers.newton_descent import descended
+from apo_bench.correction.solvers.play import fit_covariance, plays
 from apo_bench.correction.solvers.posterior import (
     LARGEST_POSTERIOR,
     RANK_CUT_OFF,
@@ -30,6 +24,7 @@ from apo_bench.correction.solvers.posterior import (
     projections,
     settled_basis,
 )
+from apo_bench.correction.solvers.projected_contacts import ProjectedContacts, project_vertices
 from apo_bench.correction.solvers.whitened import (
     Whitened,
     coordinates_of,

@@ -15,7 +15,14 @@ from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution import key_angles, moves
-from apo_bench.simulation.robot import ExecutionAborted, Robot, shifted, smooth, steady, turn_from
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+    turn_from,
+)
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
@@ -147,19 +154,23 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
             rise(robot, 0.3)
             for i, speed in enumerate(SPEEDS):
                 way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-                end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
-                line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
+                end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+                line = (
+                    smooth_trajectory(robot.T, end, speed)
+                    if speed == SPEEDS[-1]
+                    else steady_trajectory(robot.T, end, speed)
+                )
                 errors.append(error_on(line, trace(robot, line), speed))
                 robot.wait(STAND_S)
-            rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
-            before = _pushed(robot, np.zeros(3))
-            x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+            rest = float(np.linalg.norm(_push(robot, np.zeros(3)) - robot.T[:3, 3]))
+            before = _push(robot, np.zeros(3))
+            x, y, z = (1e3 * abs(float((_push(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
     except ExecutionAborted:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
 
 
-def _pushed(robot: Robot, force: Array) -> Array:
+def _push(robot: Robot, force: Array) -> Array:
     """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force

@@ -37,7 +37,7 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     without an arm were tuned with that one.
 
     Args:
-        searches: As in `moves`.
+        spiral: As in `moves`.
     """
     predicted = list[ArmMove]()
     estimated = plan.start
@@ -55,7 +55,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
 
     Args:
         held: What moves, each with its pose at the end.
-        estimated: Where all parts are before it.
+        estimated: The poses of all parts before it.
         after: Where all parts are after it.
     """
     step = move.step
@@ -90,12 +90,12 @@ def _at_limit(scene: Scene, q: Array) -> str:
 def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tuple[float, str]:
     """How deep the open gripper is in a part, [m], and in which, where it takes hold or lets go."""
     return max(
-        _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
-        _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
+        _deepest_strike(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
+        _deepest_strike(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
     )
 
 
-def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
+def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
     go; zero and nothing where they have room."""
     boxes = gripper_boxes(scene.kinematics, scene.arm, min(grip.half_width + beyond, scene.arm.opening_m))

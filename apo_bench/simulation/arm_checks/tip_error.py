@@ -6,7 +6,14 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, remembered
-from apo_bench.simulation.robot import ExecutionAborted, Robot, Trajectory, shifted, smooth, steady
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    Trajectory,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+)
 from apo_bench.simulation.robot.reach import along, limit_speed
 from apo_bench.simulation.scene import Scene
 
@@ -22,7 +29,7 @@ STAND_S = 0.3
 """How long the arm stands before it."""
 _RESTS_M = 2e-5
 _LOOKS = 10
-"""It stands so much longer, as often as this, until the tip is where it shall be: weak joints swing behind."""
+"""It stands so much longer, as often as this, until the tip is at its command: weak joints swing behind."""
 
 
 @final
@@ -51,7 +58,7 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
         with robot.watch_stability():
             rise(robot, SPEEDS[-1])
             way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-            line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
             return error_on(line, trace(robot, line), speed)
     except ExecutionAborted:
         return None
@@ -84,7 +91,7 @@ def rise(robot: Robot, speed: float) -> None:
     if robot.scene.kinematics.inverse(up, robot.q) is None:
         up[2, 3] = robot.T[2, 3]
     if np.abs(up - robot.T).max() > 0.0:
-        trace(robot, smooth(robot.T, up, speed))
+        trace(robot, smooth_trajectory(robot.T, up, speed))
     robot.wait(STAND_S)
     looks = 0
     while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:

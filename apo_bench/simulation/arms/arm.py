@@ -19,14 +19,14 @@ _GRADED = 0.6
 @copyable
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
-    """What an arm can do; None: nothing is said."""
+    """What an arm can do; None: not stated."""
 
     payload_kg: float | None = None
     """Of what is held, without the gripper."""
     speed_rad_s: Array | None = None
     """(joints,), the fastest each may turn."""
     torque_nm: Array | None = None
-    """(joints,), the most each can push; infinite where nothing is said."""
+    """(joints,), the most each can push; infinite where not stated."""
     fingers_m_s: float = 0.28
     """How fast the command of each finger moves at most."""
 
@@ -79,7 +79,7 @@ class Hand:
     def of_command(self, ctrl: Array) -> float:
         """The opening that is commanded, [m]."""
         k = int(np.abs(self.commands[-1] - self.commands[0]).argmax())
-        # The actuator whose command changes most tells the opening; its commands may fall while the opening rises.
+        # The actuator whose command changes most determines the opening; its commands may fall while the opening rises.
         order = np.argsort(self.commands[:, k], kind="stable")
         return float(np.interp(float(ctrl[k]), self.commands[order, k], self.opening[order]))
 
@@ -97,7 +97,7 @@ class Arm:
     """An arm with a gripper of two sides, ready to be put into a scene.
 
     `read_arm(FILE.toml)` makes one of the description of any arm: it finds joints, drives and pads, and measures the
-    gripper, unless its file states that. Whoever has an MJCF file that is as the fields say may make one directly,
+    gripper, unless its file states that. An MJCF file that is as the fields state can be used directly,
     without `model` and `hand`. The site `tip` lies between the fingertips: z points ahead, x along the closing
     direction.
     """

@@ -1,4 +1,4 @@
-"""From the description of an arm to an `Arm`: its model put together, its joints driven, its gripper measured."""
+"""Build an `Arm` from its description: put its model together, drive its joints, measure its gripper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
 from apo_bench.simulation.arms.grooves import fill_grooves
 from apo_bench.simulation.arms.home import with_home
-from apo_bench.simulation.arms.loading import compiled, load_model
+from apo_bench.simulation.arms.loading import compile_model, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
@@ -34,7 +34,7 @@ _FINGER_DAMPING = 0.02
 _COUPLED_SOLREF = (0.004, 1.0)
 _COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)
 _UNSAID_SOLREF = (0.02, 1.0)
-"""Fingers that are coupled as softly as MuJoCo has it where nothing is said give way by 1 mm to some newtons; they get
+"""Fingers that are coupled as softly as MuJoCo has it by default give way by 1 mm to some newtons; they get
 the first two, which the grippers that come with the benchmark have."""
 _USUAL_FINGERS_MM_S = 50.0
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
@@ -68,11 +68,11 @@ def build_arm(description: ArmDescription) -> Arm:
     """Put an arm together.
 
     Raises:
-        InputError: Its models do not fit the description, or cannot be used; what to do is said.
+        InputError: Its models do not fit the description, or cannot be used.
     """
     mjcf = description.model_file
     spec = load_model(mjcf, "arm")
-    model = compiled(spec, mjcf)
+    model = compile_model(spec, mjcf)
     flange, T_flange = find_flange(model, description)
     joints = find_joints(model, flange, description)
     last = model.body(flange).name
@@ -82,7 +82,7 @@ def build_arm(description: ArmDescription) -> Arm:
     _make_passive(spec, joints)
     if description.gripper.pads is None:
         fill_grooves(spec, joints)
-    whole = compiled(spec, mjcf)
+    whole = compile_model(spec, mjcf)
     drives = drives_of(whole, joints)
     home = _usual_home(model, joints) if description.home_deg is None else np.radians(description.home_deg)
     require(
@@ -132,7 +132,7 @@ def build_arm(description: ArmDescription) -> Arm:
 
 
 def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
-    """Attach the gripper of a file of its own to the flange, a body."""
+    """Attach the gripper of another file to the flange, a body."""
     if description.gripper_file is not None:
         hand = load_model(description.gripper_file, "gripper")
         hand.option = spec.option
@@ -196,7 +196,7 @@ def _measuring_model(spec: Any, mjcf: Path) -> Any:
     rig = spec.copy()
     probe = rig.worldbody.add_body(name=PROBE, mocap=True, pos=(0.0, 0.0, -1.0))
     probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.01, 0.01), contype=0, conaffinity=1)
-    return compiled(rig, mjcf)
+    return compile_model(rig, mjcf)
 
 
 def _drive(
@@ -210,7 +210,7 @@ def _drive(
     """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos.
 
     Args:
-        inertia: (joints,), that each joint feels, [kg m^2].
+        inertia: (joints,), at each joint, [kg m^2].
         drives: Of each joint; takes the torques of the description.
         kept: Actuators of the gripper, which stay.
     """

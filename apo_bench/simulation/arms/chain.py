@@ -21,7 +21,7 @@ _MOST_JOINTS = 8
 def find_flange(model: Any, description: ArmDescription) -> tuple[int, Array]:
     """The body at the end of the arm, and the frame of the flange in it.
 
-    A gripper of its own file is mounted where the last link ends along the axis of its joint, if nothing tells where.
+    A gripper of its own file is mounted where the last link ends along the axis of its joint, unless a flange is known.
     """
     sites = {model.site(i).name: i for i in range(model.nsite)}
     bodies = {model.body(i).name: i for i in range(1, model.nbody)}

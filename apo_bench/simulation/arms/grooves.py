@@ -14,11 +14,11 @@ import numpy as np
 
 _GROOVE_M = 0.008
 _SAME_M = 1e-5
-"""Wider than the first is no groove; boxes whose ends differ by less than the second end alike."""
+"""Wider than the first is no groove; boxes whose ends differ by less than the second are equal."""
 
 
 def fill_grooves(spec: Any, joints: Sequence[str]) -> None:
-    """Make one box of two of the same finger that are alike but for their places along one axis.
+    """Make one box of two of the same finger that differ only in their places along one axis.
 
     Args:
         joints: Of the arm; bodies that turn by them are no fingers.

@@ -77,7 +77,7 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
         q = kinematics.inverse(tip_down(np.array(_AT), way), start, 25)
         if q is None:
             continue
-        q = _unwound(q, *kinematics.range_of_joints)
+        q = _unwind(q, *kinematics.range_of_joints)
         if any(np.abs(q - other).max() < _SAME_RAD for other, _ in homes) or _in_table(kinematics, q):
             continue
         homes.append((q, way))
@@ -113,7 +113,7 @@ def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
     return reached, least
 
 
-def _unwound(q: Array, low: Array, high: Array) -> Array:
+def _unwind(q: Array, low: Array, high: Array) -> Array:
     """The same place with every joint less than half a turn from zero, where its limits let it be."""
     near = (q + np.pi) % (2 * np.pi) - np.pi
     return np.where((near >= low) & (near <= high), near, q)

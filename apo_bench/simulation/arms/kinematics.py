@@ -70,7 +70,7 @@ class Kinematics:
 
     @property
     def last(self) -> Array:
-        """Where the last search for joint angles ended, or what was last asked for, (joints,), [rad]."""
+        """Where the last search for joint angles ended, or the angles of the last call, (joints,), [rad]."""
         return np.array(self.configuration.q[self.adr])
 
     def forward(self, q: Array) -> Array:

@@ -53,7 +53,7 @@ def load_model(path: Path, kind: str) -> Any:
     return spec
 
 
-def compiled(spec: Any, path: Path) -> Any:
+def compile_model(spec: Any, path: Path) -> Any:
     """The model of what was read.
 
     Raises:

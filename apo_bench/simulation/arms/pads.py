@@ -48,14 +48,14 @@ def pads_of(
         first, second = named
     require(first and second, f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
     R_flange = data.xmat[flange].reshape(3, 3)
-    across = _snapped(across, R_flange, _SNAP)
+    across = _snap(across, R_flange, _SNAP)
     middle = np.mean([data.geom_xpos[g] for g in first + second], axis=0) - data.xpos[flange]
     ahead = middle - (middle @ across) * across
     require(
         np.linalg.norm(ahead) >= 1e-3,
         f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.",
     )
-    ahead = _snapped(ahead / np.linalg.norm(ahead), R_flange, _SNAP_AHEAD)
+    ahead = _snap(ahead / np.linalg.norm(ahead), R_flange, _SNAP_AHEAD)
     if gripper.pads is None:
         most = max(geom_reach(model, data, g, ahead) for g in first + second)
         first = [g for g in first if geom_reach(model, data, g, ahead) > most - _TIP_M]
@@ -64,7 +64,7 @@ def pads_of(
     return (first, second), across, ahead
 
 
-def _snapped(direction: Array, R: Array, near: float) -> Array:
+def _snap(direction: Array, R: Array, near: float) -> Array:
     """An axis of a frame where a direction is as good as that, else the direction."""
     along = R.T @ direction
     k = int(np.abs(along).argmax())

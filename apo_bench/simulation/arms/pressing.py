@@ -55,14 +55,14 @@ def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) ->
         data.mocap_pos[mocap] = at
         data.mocap_quat[mocap] = quaternion(R)
         closed = np.array([np.interp(half[0] - squeeze, openings, column) for column in commands.T])
-        press = _pressed(rig, geom, opened, closed, R[:, 0])
+        press = _press(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
         if press.force_n <= _MOST_N:
             break
     return press, squeeze
 
 
-def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> Press:
+def _press(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> Press:
     data = rig.data
     for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)

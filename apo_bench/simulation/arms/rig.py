@@ -69,7 +69,7 @@ def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: i
     """The model made ready: hard contacts and no gravity.
 
     Raises:
-        InputError: Nothing of the gripper moves, or what moves it is not known; what to state is said.
+        InputError: Nothing of the gripper moves, or what moves it is not known.
     """
     arm = [model.joint(name).id for name in joints]
     hanging = below(model, flange)

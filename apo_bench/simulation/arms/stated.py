@@ -27,7 +27,7 @@ def stated_arm(description: ArmDescription, model: Any, joints: list[str], flang
         flange: The body at the end of the arm.
 
     Raises:
-        InputError: Its model has not what the file names, or something is not stated that nothing else tells.
+        InputError: Its model lacks what the file names, or a key is missing.
     """
     file = description.file
     gripper = description.gripper

@@ -7,8 +7,8 @@ from apo_bench.simulation.robot import (
     Robot,
     follow_waypoints,
     plan_waypoints,
-    shifted,
-    smooth,
+    smooth_trajectory,
+    translate,
     weld,
     with_height,
 )
@@ -29,7 +29,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = hover(at)
     least = max(above[2, 3], t.over)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
     level = with_height(above, robot.T[2, 3])
     # A short arm does not reach as far out as here where it waits, or has passed over other parts.
     way = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
@@ -38,8 +38,8 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     if is_tilted(at):
-        robot.follow(smooth(robot.T, above, _NEAR))
-    robot.follow(smooth(robot.T, at, _NEAR))
+        robot.follow(smooth_trajectory(robot.T, above, _NEAR))
+    robot.follow(smooth_trajectory(robot.T, at, _NEAR))
     robot.stand()
     robot.forces.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
@@ -61,9 +61,9 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
-    robot.follow(smooth(robot.T, shifted(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.forces.handle(None)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
 
 def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:

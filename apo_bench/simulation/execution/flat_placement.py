@@ -1,7 +1,7 @@
 """Find where a held part can lie flat on what is fixed, before it is inserted.
 
-On a plane its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper). A level insertion
-needs them, and pads that only centre across cannot give them.
+On a plane its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper). A level
+insertion needs them, and pads that only centre across cannot give them.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depth
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
 from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
-from apo_bench.simulation.robot import shifted
+from apo_bench.simulation.robot import translate
 from apo_bench.simulation.scene import Scene
 
 NOISE_LEVEL = float(np.cos(np.radians(10.0)))
@@ -41,8 +41,8 @@ class FlatPlacement(NamedTuple):
 
 def before_insertion(t: Transfer) -> Array:
     """Where a part is when its last motion begins, (4, 4), world."""
-    before = shifted(first_contact_pose(t), t.into.way, -t.begins)
-    return shifted(before, UP, t.floats) if t.into.level else before
+    before = translate(first_contact_pose(t), t.into.way, -t.begins)
+    return translate(before, UP, t.floats) if t.into.level else before
 
 
 def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated: Poses) -> FlatPlacement | None:
@@ -52,7 +52,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
     Args:
         estimated: Where all parts are before the transfer.
     """
-    T = before_insertion(t) if t.into.level else shifted(t.T_world_start, UP, _LIFT_M)
+    T = before_insertion(t) if t.into.level else translate(t.T_world_start, UP, _LIFT_M)
     up = upwards(T)
     lying = [
         each
@@ -75,7 +75,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
     for each in others:
         if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _LIFT_ROOM_M).max() > -_LIFT_ROOM_M:
             return None
-    for each in fixed:  # down to the floor itself, which it shall touch
+    for each in fixed:  # down to the floor itself, which it touches
         if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max() > 0.0:
             return None
     tip = flush @ t.grips[0].T_part_tip

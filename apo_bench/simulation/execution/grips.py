@@ -81,7 +81,7 @@ def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimat
     """Grips across the level directions in which the part will have to be known and the grip itself does not settle it.
 
     All are turned from it the same way, by a quarter, unless the wrist ends there: a tip that is off on the hand then
-    puts every part off alike.
+    shifts every part by the same.
     """
     part = assembly.operations[k].main
     T = estimated[part]

@@ -1,5 +1,6 @@
-"""From a plan to transfers: grasps, ways, guards, and whether the arm reaches them. Uses what is known before the robot
-moves, and nothing else.
+"""Prepare the transfers of a plan: grasps, lines, guards, and whether the arm reaches them.
+
+Only what is known before the robot moves is used.
 """
 
 from dataclasses import replace
@@ -60,13 +61,13 @@ class Move(NamedTuple):
 
 @remembered
 def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
-    """What to do for each step of the schedule; what moves with a part is estimated to stay with it.
+    """What to do for each step of the schedule; what moves with a part stays with it.
 
     Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
 
     Args:
-        searches: Whether the robot feels for a hole where a motion into it is stopped.
-        actions: What it does besides: `square` parts before it takes them, `lay` them flat before it inserts them.
+        spiral: Whether the robot searches for a hole where a motion into it is stopped.
+        actions: Of `PROBING_ACTIONS`: `square` parts before it takes them, `lay` them flat before it inserts them.
     """
     estimated: Poses = plan.start
     put_by: dict[str, int | None] = {}
@@ -128,7 +129,7 @@ def _transfer(
 
     Args:
         was: The operation that had put the part where it is, None if it stands where it started.
-        target: Where its main part shall be, (4, 4).
+        target: The target pose of its main part, (4, 4).
         estimated: Where all parts are before it.
         after: Where all parts are after it.
     """
@@ -188,7 +189,7 @@ def holds_firmly(arm: Arm) -> bool:
 def _with_actions(
     assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses, actions: tuple[str, ...]
 ) -> Transfer:
-    """The transfer of a robot that feels, with what it does besides: a part that stands between others stays so."""
+    """The transfer with the probing actions; a part that stands between others stays so."""
     free = not (t.out.level or t.away or t.drawn)
     squared = "square" in actions and free
     laid = "lay" in actions and (t.into.level or (bool(t.entrances) and free))

@@ -1,6 +1,6 @@
-"""Replays that begin alike share their beginning: the state after each part of a move, kept and taken up again.
+"""Cache the states of replays, so that replays with the same beginning share it.
 
-MuJoCo goes on from a state exactly, so a result does not depend on what is kept.
+MuJoCo goes on from a state exactly, so a result does not depend on the cache.
 """
 
 import hashlib
@@ -76,12 +76,12 @@ class ReplayCache:
         return self._results.get(key)
 
     def end(self, key: bytes, result: ReplayResult) -> None:
-        """Keep the result of a replay under all that has led to it."""
+        """Keep the result of a replay under its key."""
         self._results[key] = result
         _drop_oldest(self._results)
 
     def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
-        """Keep the present state under what has led to it; nothing sleeps in it."""
+        """Keep the present state under its key; nothing sleeps in it."""
         if key not in self._states:
             self._states[key] = save_state(robot, grip, progress)
             _drop_oldest(self._states)
@@ -112,7 +112,7 @@ def _drop_oldest(kept: dict[bytes, Any]) -> None:
 def cache_keys(
     scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]], error: Any = None
 ) -> list[bytes]:
-    """What has led to each state: two keys for each move, one when the part is lifted, one when the move is done."""
+    """A key of the past of each state: two for each move, one when the part is lifted, one when the move is done."""
     digest = hashlib.sha256(
         _bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity, error))
     )

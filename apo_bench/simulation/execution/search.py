@@ -9,7 +9,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.search_laws import Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import Guard, Robot, Trajectory, servo, shifted, smooth
+from apo_bench.simulation.robot import Guard, Robot, Trajectory, servo, smooth_trajectory, translate
 
 RADIUS_M = 0.002
 """The robot searches for a hole so far off."""
@@ -48,7 +48,7 @@ def press_in(
     for _ in range(SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
-        stopped = shifted(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
+        stopped = translate(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
         macro = robot.macro
         robot.macro = "search"
         more = search_hole(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
@@ -56,7 +56,7 @@ def press_in(
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)
-        more = shifted(more, _ease_in(robot, more @ end, guard), 1.0)
+        more = translate(more, _ease_in(robot, more @ end, guard), 1.0)
         T_search = more if T_search is None else more @ T_search
         end = more @ end
         left = float((end - robot.T)[:3, 3] @ guard.way)
@@ -81,23 +81,23 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
     Returns:
         What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
     """
-    off = shifted(stopped, guard.way, -_BACK_M)
+    off = translate(stopped, guard.way, -_BACK_M)
     for yaw in (0.0, *YAWS_DEG):
-        turn = _turned(yaw, front)
-        _bring(robot, turn @ off, guard.way)
+        turn = _yaw_about(yaw, front)
+        _approach(robot, turn @ off, guard.way)
         turned = Guard(turn[:3, :3] @ guard.way, guard.newton)
         far = min(radius, YAWED_RADIUS_M) if yaw else radius
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         servo(robot, spiral)
         if spiral.found:
-            return shifted(turn, spiral.aside, 1.0)
-    _bring(robot, off, guard.way)
-    robot.follow(smooth(robot.T, stopped, _BACK), guard)
+            return translate(turn, spiral.aside, 1.0)
+    _approach(robot, off, guard.way)
+    robot.follow(smooth_trajectory(robot.T, stopped, _BACK), guard)
     return None
 
 
 def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
-    """Go on as deep as a tip pose, giving way across; returns how far aside of it that led, (3,), world, [m]."""
+    """Go on as deep as a tip pose, giving way across; returns how far aside of it the tip ends, (3,), world, [m]."""
     while (left := float((end - robot.T)[:3, 3] @ guard.way)) > _NOTHING_M:
         easing = Easing(guard, min(left, _PIECE_M), robot.step_s)
         servo(robot, easing)
@@ -107,13 +107,13 @@ def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
     return np.asarray(off - (off @ guard.way) * guard.way)
 
 
-def _bring(robot: Robot, T: Array, way: Array) -> None:
+def _approach(robot: Robot, T: Array, way: Array) -> None:
     """Back first, so that nothing is touched on the way."""
-    robot.follow(smooth(robot.T, shifted(robot.T, way, -_BACK_M), _BACK))
-    robot.follow(smooth(robot.T, T, _BRING))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, way, -_BACK_M), _BACK))
+    robot.follow(smooth_trajectory(robot.T, T, _BRING))
 
 
-def _turned(yaw_deg: float, about: Array) -> Array:
+def _yaw_about(yaw_deg: float, about: Array) -> Array:
     """The turn about the vertical through a point, (4, 4), world."""
     R = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw_deg))[:3, :3]
     return frame(R, about - R @ about)

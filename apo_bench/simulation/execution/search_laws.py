@@ -82,7 +82,7 @@ class Spiral:
         return PITCH_M * self._angle / (2.0 * math.pi)
 
     def __call__(self, force: Sequence[float]) -> Array | None:
-        """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
+        """How far the tip moves from where it began, (3,), world, [m]; None at the end."""
         push, across = self._felt(force)
         side = math.hypot(*across)
         self.found = self._ahead > self.deep
@@ -113,7 +113,7 @@ class Easing:
         self.stopped = False
 
     def __call__(self, force: Sequence[float]) -> Array | None:
-        """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
+        """How far the tip moves from where it began, (3,), world, [m]; None at the end."""
         push, side = self._felt(force)
         self.stopped = push > self.guard.newton
         if self.stopped or self._ahead >= self.length:

@@ -27,7 +27,7 @@ STAND_OFF_M = 0.004
 _OVER_M = 0.003
 """The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
 _APART_M = 0.01
-"""Places that are less far apart tell a tilt no better than feet do."""
+"""Places that are less far apart determine a tilt no better than feet do."""
 _ROOM_M = 0.001
 _STEP_M = 0.002
 _LOOKS_M = 0.004
@@ -90,14 +90,14 @@ def find_side_touches(
         lines = np.arange(ends.min() + _STEP_M, ends.max(), _STEP_M)
         for at in sorted(lines, key=lambda at: abs(at - ends.mean())):
             edge = at * along + float(n @ corners[0]) * n + high * UP
-            for R in _turned(scene, t, upright, n):
+            for R in _upright_turns(scene, t, upright, n):
                 both = tuple(_at(scene, t, R, n, edge, up) for up in (_OVER_M, deep))
                 if all(_free(scene, t, each, wall, others) for each in both):
                     return both
     return ()
 
 
-def _turned(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[Array]:
+def _upright_turns(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[Array]:
     """How the part stands, (3, 3), when the pads are along the wall's normal, either way, the nearer to rest first."""
     rest = scene.kinematics.forward(scene.arm.home)
     y = upright @ t.grips[0].T_part_tip[:3, 1]

@@ -61,7 +61,7 @@ def frames(
                 camera = camera_view(*framing, FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)
                 views.append((stack.enter_context(renderer(segment.world.model, *size)), camera))
             data = initial_state(segment.world, segment.start)
-            for moment, force_n, most_n in sampled(segment.moments, speed / fps):
+            for moment, force_n, most_n in sample_moments(segment.moments, speed / fps):
                 empty = moment.phase.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"
                 caption = Caption(segment.title, pace, _lines(assembly, moment), force)
@@ -87,7 +87,7 @@ def _draw(
     return add_caption(pictures[0], pictures[1], caption)
 
 
-def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
+def sample_moments(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
     """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
     since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
     at = -np.inf

@@ -1,4 +1,4 @@
-"""What is laid over one moment: goals, hands and names of faces."""
+"""Draw over one moment: poses of parts, hands and names of faces."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ _OFF_M = 0.004  # how far before a flat face its name stands
 
 
 class Overlay(NamedTuple):
-    """Parts drawn once more, where they are believed or should be."""
+    """Parts drawn once more, at their estimated or true poses."""
 
     poses: Poses
     color: Color

@@ -37,7 +37,7 @@ class Segment:
     ending: str
     """What came of it, in a sentence."""
     good: bool | None
-    """Whether that is a success; None where nobody asks."""
+    """Whether that is a success; None of what has no verdict."""
 
 
 @final
@@ -61,7 +61,7 @@ class FilmTrack:
 
 
 def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
-    """What a scenario asks for: the parts before the first operation and after each, a second apart."""
+    """The nominal assembly of a scenario: the parts before the first operation and after each, a second apart."""
     world = scene.work
     data = initial_state(world, start)
     moments = list[FilmMoment]()
@@ -71,7 +71,7 @@ def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
             set_part_pose(world, data, part, poses[part])
         phase = Phase(None if k < 0 else k, _IN_PLACE, 0.0)
         moments.append(FilmMoment(k + 1.0, np.array(data.qpos), phase, _NO_HANDS))
-    return Segment(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
+    return Segment(f"{scene.scenario.name}: as the scenario states it", world, start, tuple(moments), "", None)
 
 
 def part_poses(segment: Segment, moment: FilmMoment) -> Poses:

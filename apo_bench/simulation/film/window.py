@@ -53,13 +53,13 @@ def step_in_window(
     press: Callable[[str], None],
     pass_time: Callable[[float], None],
 ) -> None:
-    """Open the window and show what is asked for until a person closes it.
+    """Open the window and show snapshots until a person closes it.
 
     Args:
         assembled: What the camera looks at.
-        now: What is to be shown.
-        press: Told what a key means, one of `WINDOW_KEYS`.
-        pass_time: Told how many seconds have passed.
+        now: The snapshot to show.
+        press: Called with what a key means, one of `WINDOW_KEYS`.
+        pass_time: Called with how many seconds have passed.
     """
     import mujoco.viewer
 

@@ -36,7 +36,7 @@ def demonstrate(
 
     The error is put into the operation that the scenario names, and parts that are put against a displaced one follow
     it. At the last operation the other hand corrects all of them; those small motions show in `final`, not in the
-    goals, since nobody looked at these parts again.
+    goals, since these parts are not observed again.
 
     Args:
         human_error: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
@@ -54,7 +54,7 @@ def demonstrate(
             raise
         after = []
     if not after or has_failed(hands.data):
-        # Where the parts are is not known any more, and nobody asks.
+        # Where the parts are is not known any more.
         why, goals, final = "the simulation became unstable", layout.poses, layout.start
     else:
         why = _wrong(scene, layout, after)

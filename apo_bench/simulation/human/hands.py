@@ -50,12 +50,12 @@ class Hands:
         self._held: list[dict[str, Array]] = [{} for _ in HANDS]
 
     def begin(self, operation: int) -> None:
-        """Say which operation begins, counted from 0, to who wants to know."""
+        """Call the hook before an operation, counted from 0."""
         self._operation = operation
         self._hooks.before_step(Step(operation))
 
     def end(self, operation: int) -> None:
-        """Say which operation has ended, counted from 0, to who wants to know."""
+        """Call the hook after an operation, counted from 0."""
         self._hooks.after_step(Step(operation))
 
     def pose(self, part: str) -> Array:
@@ -148,7 +148,7 @@ class Hands:
             self._step(1)
 
     def _step(self, n: int) -> None:
-        """Step, and let who watches look whenever it is time."""
+        """Step, and call the hook after every tick."""
         while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
             self._tick(self.data)
@@ -162,7 +162,7 @@ class Hands:
         """Let time pass that is not simulated.
 
         Args:
-            put: Makes of the present state what it will be so many steps later; who watches is shown that in a copy.
+            put: Makes of the present state what it will be so many steps later; the hook gets that in a copy.
         """
         if self._hooks.after_tick is not None:
             for i in range(self._every - self._steps, steps + 1, self._every):
@@ -174,7 +174,7 @@ class Hands:
         self._after(self.data, steps, put)
 
     def _tick(self, data: Any) -> None:
-        """Let who watches look."""
+        """Call the hook after a tick."""
         if self._hooks.after_tick is not None:
             self._hooks.after_tick(data, Phase(self._operation, BY_HAND, 0.0))
 

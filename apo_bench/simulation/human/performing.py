@@ -6,7 +6,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.operation import HandOperation
-from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height
+from apo_bench.simulation.robot import Trajectory, minimum_jerk, smooth_trajectory, translate, with_height
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
@@ -19,7 +19,7 @@ _NUDGE = 0.01
 _SAFE_M = 0.16
 """Least height at which parts are carried over the others."""
 _DROP_M = 0.0002
-"""A part is let go this much above its support, as nobody presses it into the table."""
+"""A part is let go this much above its support, as a hand does not press it into the table."""
 _LIFT_M = 0.0003
 """How far a part is lifted while it is adjusted, so that it does not drag the one below."""
 STAND_STILL_S = 0.3
@@ -37,14 +37,14 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
         T = _free(hands, T, operation.out, clearance_m)
     safe = max(_SAFE_M, operation.over, before[2, 3])
     for end in (with_height(T, max(safe, T[2, 3])), with_height(before, safe), before):
-        hands.move((0, smooth(T, end, _SPEED, turn_speed=4.0)))
+        hands.move((0, smooth_trajectory(T, end, _SPEED, turn_speed=4.0)))
         T = end
     for part in (part for part in operation.late if part in operation.carries):
         hands.wait(_SETTLE_S)
         _shift_carried(hands, operation, part, clearance_m)
-    _bring(hands, operation, smooth(before, beside, _STROKE))
+    _place(hands, operation, smooth_trajectory(before, beside, _STROKE))
     if operation.aside.any():
-        hands.move((0, smooth(beside, goal, _SHIFT)))
+        hands.move((0, smooth_trajectory(beside, goal, _SHIFT)))
         hands.wait(0.05)
     hands.let_go(0, operation.part, *operation.carries)
     hands.wait(STAND_STILL_S)
@@ -52,10 +52,10 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
     """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
-    raised = shifted(T, UP, clearance_m)
-    hands.move((0, smooth(T, raised, _NUDGE)))
-    hands.move((0, smooth(raised, shifted(raised, out, 1.0), _STROKE)))
-    return shifted(raised, out, 1.0)
+    raised = translate(T, UP, clearance_m)
+    hands.move((0, smooth_trajectory(T, raised, _NUDGE)))
+    hands.move((0, smooth_trajectory(raised, translate(raised, out, 1.0), _STROKE)))
+    return translate(raised, out, 1.0)
 
 
 def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) -> tuple[Array, Array, Array]:
@@ -63,11 +63,11 @@ def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) 
 
     Over a floor without play the part is held up by half the clearance, as friction would hold it back.
     """
-    goal = target = shifted(operation.target, UP, clearance_m / 2) if operation.drags else operation.target
+    goal = target = translate(operation.target, UP, clearance_m / 2) if operation.drags else operation.target
     if operation.from_above:
-        goal = shifted(operation.target, UP, _DROP_M + (_rise(hands, operation, T) if operation.carries else 0.0))
-    beside = shifted(goal, operation.aside, 1.0) if operation.aside.any() else goal
-    return shifted(shifted(target, operation.way, -operation.travel), operation.aside, 1.0), beside, goal
+        goal = translate(operation.target, UP, _DROP_M + (_rise(hands, operation, T) if operation.carries else 0.0))
+    beside = translate(goal, operation.aside, 1.0) if operation.aside.any() else goal
+    return translate(translate(target, operation.way, -operation.travel), operation.aside, 1.0), beside, goal
 
 
 def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
@@ -76,7 +76,7 @@ def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
     return max(float(operation.true[part][2, 3] - (way @ hands.pose(part))[2, 3]) for part in operation.bearing)
 
 
-def _bring(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
+def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
     """The last motion; the other hand adjusts what is displaced on the way, the last of it while the part arrives."""
     standing = [part for part in operation.late if part not in operation.carries]
     for part in standing[:-1]:
@@ -84,7 +84,7 @@ def _bring(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
         hands.let_go(1, part)
     if standing:
         _adjust(hands, standing[-1], operation.true[standing[-1]], _LIFT_M, ((0, _first(stroke, 0.15)),))
-        hands.move((0, smooth(_first(stroke, 0.15).end, stroke.end, _STROKE)))
+        hands.move((0, smooth_trajectory(_first(stroke, 0.15).end, stroke.end, _STROKE)))
     else:
         hands.move((0, stroke))
     hands.wait(0.05)
@@ -108,11 +108,11 @@ def _adjust(
     if held:
         hands.let_go(0, part)
     there = with_height(true, here[2, 3])
-    hands.move((1, smooth(here, shifted(here, UP, lift), _NUDGE)))
-    hands.move((1, smooth(shifted(here, UP, lift), shifted(there, UP, lift), _SHIFT)), *meanwhile)
-    hands.move((1, smooth(shifted(there, UP, lift), there, _NUDGE)))
+    hands.move((1, smooth_trajectory(here, translate(here, UP, lift), _NUDGE)))
+    hands.move((1, smooth_trajectory(translate(here, UP, lift), translate(there, UP, lift), _SHIFT)), *meanwhile)
+    hands.move((1, smooth_trajectory(translate(there, UP, lift), there, _NUDGE)))
 
 
 def _first(stroke: Trajectory, fraction: float) -> Trajectory:
-    """The first part of a stroke, as a motion of its own."""
+    """The first part of a stroke, as a motion."""
     return Trajectory(stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, minimum_jerk)

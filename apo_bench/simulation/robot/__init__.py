@@ -1,4 +1,4 @@
-"""The arm in motion: lines followed, contacts felt."""
+"""The arm in motion: it follows lines and measures contact forces."""
 
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
 from apo_bench.simulation.robot.forces import Guard, LowPass
@@ -8,10 +8,10 @@ from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, o
 from apo_bench.simulation.robot.paths import (
     Trajectory,
     minimum_jerk,
-    paced,
-    shifted,
-    smooth,
-    steady,
+    paced_trajectory,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
     turn_from,
     with_height,
 )
@@ -19,7 +19,14 @@ from apo_bench.simulation.robot.reach import at_end, follow_waypoints, plan_wayp
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, READING_S, WristSensor, felt_noise, low_pass_part, part_loads
+from apo_bench.simulation.robot.wrist import (
+    BANDWIDTH_HZ,
+    READING_S,
+    WristSensor,
+    filtered_noise,
+    low_pass_part,
+    part_loads,
+)
 
 __all__ = (
     "BANDWIDTH_HZ",
@@ -39,23 +46,23 @@ __all__ = (
     "WristSensor",
     "at_end",
     "comply",
-    "felt_noise",
+    "filtered_noise",
     "follow_waypoints",
     "gripper_boxes",
     "low_pass_part",
     "minimum_jerk",
     "near_spans",
     "obstacle",
-    "paced",
+    "paced_trajectory",
     "part_loads",
     "plan_waypoints",
     "press",
     "reading",
     "servo",
-    "shifted",
-    "smooth",
-    "steady",
+    "smooth_trajectory",
+    "steady_trajectory",
     "take_along",
+    "translate",
     "turn_from",
     "weld",
     "with_height",

@@ -1,6 +1,6 @@
-"""Motions that depend on what is felt: by the force on the part in the hand, or by the sensor at the wrist.
+"""Motions that depend on force: on the part in the hand, or by the sensor at the wrist.
 
-Nothing is left out while the wrist feels: its motions are simulated in full at either fidelity.
+Nothing is left out while the sensor reads: these motions are simulated in full at either fidelity.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.geometry import Array, pose
 from apo_bench.records import ft_noise
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.robot.paths import Trajectory, shifted
+from apo_bench.simulation.robot.paths import Trajectory, translate
 from apo_bench.simulation.robot.reach import joint_gradients
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
@@ -30,10 +30,10 @@ _FAR_RAD = 0.0025
 
 
 def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
-    """Shift the tip a little, step by step, as the force on the part in the hand has it.
+    """Shift the tip a little, step by step, by the force on the part in the hand.
 
     Args:
-        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
+        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip moves off
             where it began, (3,) world, [m], or None to end.
 
     Raises:
@@ -41,7 +41,7 @@ def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
     """
     q = robot.q
     offset = np.zeros(3)
-    ends = [(shifted(robot.T, axis, -_SHIFT_M), shifted(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
+    ends = [(translate(robot.T, axis, -_SHIFT_M), translate(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
     J_inverse = robot.reached(joint_gradients(robot.scene.kinematics, ends, q, _SHIFT_M))
     force: Sequence[float] = robot.forces.net()
     passed = 0
@@ -50,7 +50,7 @@ def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
         passed += 1
         force = robot.servo_step(q + offset @ J_inverse, passed)
     robot.q = q + offset @ J_inverse
-    robot.T = shifted(robot.T, offset, 1.0)
+    robot.T = translate(robot.T, offset, 1.0)
 
 
 def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
@@ -105,7 +105,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
 
     Returns:
         What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
-        its end, and nothing was felt.
+        its end, and nothing was met.
 
     Raises:
         ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
@@ -115,11 +115,11 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
 
 
 def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
-    """Move the hand a little, reading by reading, as the wrench has it: `servo` in six directions.
+    """Move the hand a little, reading by reading, by the wrench: `servo` in six directions.
 
     Args:
         law: Called at each reading (`READING_S`) with the filtered wrench, (6,), [N] and [Nm], world, about the point
-            where it is then; returns how far the hand shall be off where it began, (6,): the shift of the point, [m],
+            where it is then; returns how far the hand moves off where it began, (6,): the shift of the point, [m],
             and a rotation vector about it, [rad], world; or None to end.
         about: The point, (3,), world, [m]; it moves with the hand.
 

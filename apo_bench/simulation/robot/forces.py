@@ -25,7 +25,7 @@ class LowPass:
         self.force = [0.0, 0.0, 0.0]
 
     def __call__(self, force: Sequence[float], seconds: float) -> list[float]:
-        """The filtered force, (3,), [N], after one that was felt for so long; at most the time constant."""
+        """The filtered force, (3,), [N], after one that lasted so long, at most the time constant."""
         part = seconds / self._time_constant_s
         x, y, z = self.force
         fx, fy, fz = force
@@ -63,7 +63,7 @@ class ForceSensors:
         """The largest that the sensor at the wrist has shown."""
 
     def hold(self, *parts: str) -> None:
-        """Say which parts are in the hand: the held one and what it carries, or none."""
+        """Set which parts are in the hand: the held one and what it carries, or none."""
         self.held = parts
         self.wrist = LowPass(WRIST_S)
         # The force on a part is that of its own sensor, the other way round, less what the arm exerts on it; what the
@@ -75,7 +75,7 @@ class ForceSensors:
             self._net_of_sensors[:, 3 * i : 3 * i + 3] -= np.eye(3)
 
     def handle(self, part: str | None) -> None:
-        """Say which part the fingers may touch."""
+        """Set which part the fingers may touch."""
         self._handled = None if part is None else self._free.index(part)
 
     def net(self) -> list[float]:
@@ -83,14 +83,14 @@ class ForceSensors:
         net: list[float] = np.dot(self._net_of_sensors, self._sensors, self._net).tolist()
         return net
 
-    def feel(self, step_s: float) -> list[float]:
+    def read(self, step_s: float) -> list[float]:
         """The net force in the last step, (3,) world, [N]; the sensor at the wrist takes it up."""
         force = self.net()
         self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
         return force
 
     def load(self) -> float:
-        """The weight that the gripper feels, [N]: of the held part and of what really hangs on it."""
+        """The weight on the gripper, [N]: of the held part and of what really hangs on it."""
         return -float(self._on_arm[:, 2].sum())
 
     def struck(self) -> str | None:

@@ -1,6 +1,6 @@
 """Move what is in the hand: keep it there on its way, take it along at once, weld it.
 
-What is carried freely stays where it is in the hand. A contact of MuJoCo asks for J a = -b J v, where J v is the speed
+What is carried freely stays where it is in the hand. A contact of MuJoCo solves J a = -b J v, where J v is the speed
 of one side past the other. The acceleration of one side past the other is J a + dJ/dt v, and dJ/dt v is not zero where
 contacts move along an arc. So the pads take a carried part along with an error of some |dJ/dt v| / b, 1 mm/s: it creeps
 by 0.1 to 1.1 mm until it is above its goal. With dJ/dt v taken off the right side, step by step, 0.77 mm became 0.03 at
@@ -82,7 +82,7 @@ def fast_forward(
 
 
 def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Array, Array, Array]) -> None:
-    """Move parts as one rigid body with a frame, (4, 4): where it is, where it shall be, and where `TINY_S` later."""
+    """Move parts as one rigid body with a frame, (4, 4): where it is, where it goes, and where `TINY_S` later."""
     before, after, later = frames
     way = after @ pose.inverse(before)
     # Velocity of the frame by differences; R(later) R(after)^T is 1 + hat(spin) TINY_S to first order, so the spin is

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from apo_bench.geometry import Array
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_around, waypoints_unwound
+from apo_bench.simulation.robot.paths import Trajectory, smooth_trajectory, waypoints_around, waypoints_unwound
 
 _KNOT_M = 0.03
 _KNOT_RAD = 0.15
@@ -24,7 +24,7 @@ _CREEP_RAD_S = 2e-3
 """Dry friction is full above some such."""
 _FAR_M = 0.3
 _FAR_RAD = 1.0
-"""The spacing of knots where only the joint angles at the end are asked for, and nothing is between them."""
+"""The spacing of knots where only the joint angles at the end are needed, and nothing is between them."""
 
 
 class Knots(NamedTuple):
@@ -85,7 +85,7 @@ def plan_waypoints(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Ar
 def follow_waypoints(kinematics: Kinematics, T: Array, way: Sequence[Array], q: Array) -> Array | None:
     """Where the joints end that lead the tip along straight lines from T, where they are q; None out of reach."""
     for to in way:
-        path = along(kinematics, smooth(T, to, 1.0), np.array([0.0, 1.0]), q)
+        path = along(kinematics, smooth_trajectory(T, to, 1.0), np.array([0.0, 1.0]), q)
         if path is None:
             return None
         T, q = to, path[-1]
@@ -93,7 +93,7 @@ def follow_waypoints(kinematics: Kinematics, T: Array, way: Sequence[Array], q: 
 
 
 def feedforward_command(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
-    """What position servos are commanded so that the joints are on a path, (n, joints), at velocities, [rad/s].
+    """The commands of position servos with which the joints are on a path, (n, joints), at velocities, [rad/s].
 
     Args:
         lead: (joints,), damping over gain, [s].
@@ -146,8 +146,7 @@ def limit_speed(
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
     """How many steps of these lengths, [m] and [rad], a line takes."""
-    length = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    return max(length / far, float(np.linalg.norm(line.turn)) / turn)
+    return max(line.length / far, float(np.linalg.norm(line.turn)) / turn)
 
 
 def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:

@@ -1,9 +1,9 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
 Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
-`servo_step`, for motions of which each depends on what was felt in the one before it. The robot knows what it commanded, its
-own joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads
-or sets poses of parts is the simulation's own: `_look` and `slip` shift them in the hand, `in_hand` records that, and
+`servo_step`, for motions of which each depends on the force in the step before. The robot knows what it commanded,
+its joint and finger positions and the force on the part in its hand: no command depends on where a part is. The
+simulation alone reads or sets poses of parts: `_look` and `slip` shift them in the hand, `in_hand` records that, and
 `follow` and `fingers` leave out steps while nothing is near (fidelity `near-contact`). One class: these share steps.
 """
 
@@ -22,7 +22,7 @@ from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, fast_forward, hold_steady, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
-from apo_bench.simulation.robot.paths import Trajectory, smooth
+from apo_bench.simulation.robot.paths import Trajectory, distance, smooth_trajectory
 from apo_bench.simulation.robot.reach import along, at_end, feedforward_command, limit_speed, plan_waypoints
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
@@ -35,16 +35,21 @@ _REST_M_S = 3e-3
 
 
 class ExecutionAborted(Exception):
-    """The robot gives up; caught by `replay`, which makes an `Outcome` of it."""
+    """The robot aborts the execution; `replay` catches it and makes an `Outcome` of it.
+
+    Attributes:
+        stage: What the robot did: `pick`, `carry`, `attach` and so on.
+        code: What went wrong, a failure code.
+        part: Which part it is about, if not the one that is moved.
+        why: What is known of the cause.
+    """
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
         super().__init__(stage, code, part)
         self.stage = stage
         self.code = code
         self.part = part
-        """Which part it is about, if not the one that is moved."""
         self.why = ""
-        """What is known of the cause."""
 
 
 class Robot:
@@ -72,7 +77,7 @@ class Robot:
         """Reads every step and stops guarded motions, while it is on (`by_wrist`)."""
         self._error = error
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
-        # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.
+        # What is near is looked for where the tip is estimated, so with joints that are off nothing is left out.
         self.fidelity = "full" if self._off.any() else fidelity
         self._carried: Carried | None = None
         model = self.model
@@ -102,7 +107,7 @@ class Robot:
 
     @contextmanager
     def watch_stability(self) -> Iterator[None]:
-        """Give up, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
+        """Abort, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
         try:
             yield
         except (mujoco.FatalError, ArithmeticError, ValueError) as error:
@@ -139,7 +144,7 @@ class Robot:
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
                 self.stand(0.06)
-                return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
+                return distance(self.T, line.end)
             self.q = path[-1]
             done = end
         self.T = line.end
@@ -148,10 +153,13 @@ class Robot:
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
         for T in plan_waypoints(self.scene.kinematics, self.arm, self.T, end, self.q):
-            self.follow(smooth(self.T, T, speed, turn_speed))
+            self.follow(smooth_trajectory(self.T, T, speed, turn_speed))
 
     def servo_step(self, q: Array, passed: int = 1, velocity: Array | None = None) -> list[float]:
-        """One physics step towards joint angles, [rad], led by a velocity, [rad/s]; whenever a tick has passed, a look.
+        """Take one physics step towards joint angles, [rad], with a velocity, [rad/s], fed forward.
+
+        Args:
+            passed: How many steps have passed: after a tick the robot looks for trouble.
 
         Returns:
             The force on the part in the hand, (3,) world, [N].
@@ -159,7 +167,7 @@ class Robot:
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
         self.data.ctrl[self._drives] = to + self._off
         mujoco.mj_step(self.model, self.data)
-        force = self.forces.feel(self.step_s)
+        force = self.forces.read(self.step_s)
         if passed % self._steps_of_tick == 0:
             self._look()
         return force
@@ -204,7 +212,7 @@ class Robot:
         fingers.command(self.data, to)
 
     def _rests(self) -> bool:
-        """Whether the joints and the fingers rest, as far as they feel."""
+        """Whether the joints and the fingers rest, by their encoders."""
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
 
@@ -234,7 +242,7 @@ class Robot:
         return np.asarray(pose.inverse(self.tip()) @ part_pose(self.scene.work, self.data, self.forces.held[0]))
 
     def slip(self, operation: int) -> None:
-        """What is in the hand moves along the pads, if the robot's errors have it so; nothing else learns of it."""
+        """What is in the hand moves along the pads, if the robot's errors state it; nothing else knows of it."""
         held = self.forces.held
         if self._error is None or not held or not self._error.slips(operation):
             return
@@ -267,13 +275,13 @@ class Robot:
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _pass(self, seconds: float) -> None:
-        """Let time pass in which nothing is felt."""
+        """Let time pass in which no force acts."""
         self.data.time += seconds
         self.forces.wrist((0.0, 0.0, 0.0), min(seconds, WRIST_S))
         self.left_out_s += seconds
 
     def reached(self, q: Array | None) -> Array:
-        """Joint angles, if the arm can be there; else it gives up."""
+        """Joint angles, if the arm can be there; else the robot aborts."""
         if q is None:
             raise ExecutionAborted(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
@@ -299,8 +307,8 @@ class Robot:
     def _tick(self, commands: Array, guard: Guard | None = None) -> int:
         """One physics step for each command, (n, controls), between two looks.
 
-        What is held is felt at each step, and all of it while the sensor at the wrist is on. Otherwise nothing is asked
-        of an empty hand before the look, so sensors are computed in the last step only.
+        Forces on what is held are read at each step, and all forces while the sensor at the wrist is on. Sensors of an
+        empty hand are read at the look only, so they are computed in the last step only.
 
         Returns:
             After how many steps the guard stopped it; 0 if it did not.
@@ -321,7 +329,7 @@ class Robot:
         for steps, command in enumerate(commands, start=1):
             data.ctrl[:] = command
             mujoco.mj_step(model, data)
-            x, y, z = self.forces.feel(step_s)
+            x, y, z = self.forces.read(step_s)
             if self.wrist is not None:
                 if self.wrist.take(step_s) and self.wrist.stops(guard):
                     return steps

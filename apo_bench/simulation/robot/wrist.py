@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, final
 
-import mujoco
 import numpy as np
 
 from apo_bench.geometry import Array, pose
@@ -19,14 +18,15 @@ from apo_bench.records import FtNoise
 from apo_bench.scenario.parts import read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.frames import body_frame, frame
+from apo_bench.simulation.frames import body_frame
 from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.gripper import open_hand
 from apo_bench.simulation.scene import WRIST_SENSORS, Scene
 
 READING_S = 0.001
 """Time from one reading to the next. Each is the mean since the one before, with new noise, whatever the step."""
 BANDWIDTH_HZ = 16.0
-"""Of the low pass, a time constant of 10 ms: so much the robot feels late, and a reading's noise is 0.22 times."""
+"""Of the low pass, a time constant of 10 ms: so late a force is known, and the noise of a reading is 0.22 times."""
 OFFSETS = 20.0
 """Standard deviation of what a sensor shows of nothing until it is zeroed, in standard deviations of its noise."""
 _GRAVITY = 9.81
@@ -43,20 +43,14 @@ class Load(NamedTuple):
 
 def hand_load(kinematics: Kinematics, arm: Arm, opening: float) -> Load:
     """The hand at an opening [m], by the model of the arm alone."""
-    model = kinematics.model
-    data = mujoco.MjData(model)
-    for finger, joint in zip(arm.fingers, arm.finger_joints(opening), strict=True):
-        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = joint
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mount = model.body(arm.mount).id
-    tip = model.site(arm.tip).id
-    center = data.site_xmat[tip].reshape(3, 3).T @ (data.subtree_com[mount] - data.site_xpos[tip])
-    return Load(float(model.body_subtreemass[mount]), center)
+    data, T_tip = open_hand(kinematics, arm, opening)
+    mount = kinematics.model.body(arm.mount).id
+    center = T_tip[:3, :3].T @ (data.subtree_com[mount] - T_tip[:3, 3])
+    return Load(float(kinematics.model.body_subtreemass[mount]), center)
 
 
 def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...]:
-    """Parts by their files, each (4, 4) where it is believed to lie in the hand."""
+    """Parts by their files, each (4, 4) at its estimated pose in the hand."""
     loads = []
     for part, T in T_tip_part.items():
         solid = scene.scenario.assembly.solids[part]
@@ -66,15 +60,15 @@ def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...
 
 
 def low_pass_part(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
-    """How much of a new reading goes into what is felt."""
+    """How much of a new reading goes into the filtered one."""
     return 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
 
 
-def felt_noise(noise: FtNoise, part: float) -> FtNoise:
+def filtered_noise(noise: FtNoise, part: float) -> FtNoise:
     """What a low pass leaves of the noise: y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
 
     Args:
-        part: a, how much of a new reading goes into what is felt.
+        part: a, how much of a new reading goes into the filtered one.
     """
     left = math.sqrt(part / (2.0 - part))
     return FtNoise(left * noise.force_n, left * noise.torque_nm)
@@ -82,7 +76,7 @@ def felt_noise(noise: FtNoise, part: float) -> FtNoise:
 
 @final
 class WristSensor:
-    """What one arm feels at its wrist during one replay."""
+    """The sensor at the wrist of one arm during one replay."""
 
     def __init__(
         self,
@@ -110,7 +104,9 @@ class WristSensor:
         self._part = low_pass_part(bandwidth_hz)
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
         self._zero: Array = np.zeros(6)
-        self._T_tip_sensor = _sensor_frame(scene.kinematics, scene.arm)
+        data, T_tip = open_hand(scene.kinematics, scene.arm, scene.arm.opening_m)
+        mount = body_frame(data, scene.kinematics.model.body(scene.arm.mount).id)
+        self._T_tip_sensor = pose.inverse(T_tip) @ mount  # both are on the same rigid body
         self._sum: Array = np.zeros(6)
         self._summed_s = 0.0
         self._clock_s = 0.0
@@ -123,11 +119,11 @@ class WristSensor:
 
     @property
     def sigma(self) -> tuple[float, float]:
-        """Standard deviation of what is felt behind the low pass, per axis, [N] and [Nm]."""
-        return felt_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
+        """Standard deviation behind the low pass, per axis, [N] and [Nm]."""
+        return filtered_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:
-        """Say what is in the hand, or nothing, as it is believed (`part_loads`); its weight is not felt then."""
+        """Set what is in the hand, or nothing, by its estimate (`part_loads`), whose weight is subtracted."""
         self._held = parts
         T = pose.inverse(self._T_tip_sensor)
         loads = (self._hand, *parts)
@@ -137,7 +133,7 @@ class WristSensor:
         self._weights = _GRAVITY * np.vstack([mass * np.eye(3), pose.hat(moment)])
 
     def begin(self, hand: Load) -> None:
-        """Feel anew, after time in which nothing was read: the first reading is taken as it is."""
+        """Begin again after time in which nothing was read: the first reading is taken as it is."""
         self._hand = hand
         self.hold(*self._held)
         self._sum = np.zeros(6)
@@ -161,7 +157,7 @@ class WristSensor:
         return True
 
     def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
-        """The same sensor, as it is zeroed, in another simulation of its robot and with other noise; begin anew."""
+        """The same sensor, as it is zeroed, in another simulation of its robot and with other noise."""
         other = copy.copy(self)
         other._raw = sensordata[self._raw_at : self._raw_at + 6]
         other._encoders = encoders
@@ -206,13 +202,3 @@ class WristSensor:
     def _sensor(self) -> Array:
         """Where the sensor is by the encoders, (4, 4), world."""
         return np.asarray(self._kinematics.forward(self._encoders()) @ self._T_tip_sensor)
-
-
-def _sensor_frame(kinematics: Kinematics, arm: Arm) -> Array:
-    """The mount of the hand in the frame of the tip, (4, 4): both are on the same rigid body."""
-    model = kinematics.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    tip = model.site(arm.tip).id
-    T_tip = frame(data.site_xmat[tip], data.site_xpos[tip])
-    return np.asarray(pose.inverse(T_tip) @ body_frame(data, model.body(arm.mount).id))

@@ -20,7 +20,7 @@ OF_PARTS = (1 << 31) - 1 - _ARM
 _PARTS = 1 << 30
 """The bit by which parts meet each other; those below it are of holes, the narrowest has the highest."""
 _MOST = 16
-"""So many widths of holes are told apart; wider ones count as one."""
+"""So many widths of holes are distinguished; wider ones count as one."""
 _SURELY_M = 1e-4
 """What is wider than the hole without its walls by this stays out."""
 
@@ -35,7 +35,7 @@ class Bits(NamedTuple):
 def meetings(solids: Mapping[str, Solid], clearance_m: float) -> Mapping[str, Mapping[str, Bits]]:
     """Part -> name of a piece as it is simulated -> its bits."""
     lined = {part: linings(solid, clearance_m) for part, solid in solids.items()}
-    widths = sorted({_rounded(width) for walls in lined.values() for width in walls.values()})
+    widths = sorted({round(width, 6) for walls in lined.values() for width in walls.values()})
     return {
         part: {
             piece.name: _of_wall(lined[part][piece.name], widths) if piece.name in lined[part] else _of(piece, widths)
@@ -52,7 +52,7 @@ def is_lining(bits: Bits) -> bool:
 
 
 def _of_wall(width: float, widths: list[float]) -> Bits:
-    return Bits(_hole(widths.index(_rounded(width))), _ARM)
+    return Bits(_hole(widths.index(round(width, 6))), _ARM)
 
 
 def _of(piece: Piece, widths: list[float]) -> Bits:
@@ -68,10 +68,6 @@ def _of(piece: Piece, widths: list[float]) -> Bits:
 
 def _hole(i: int) -> int:
     return _PARTS >> (1 + min(i, _MOST - 1))
-
-
-def _rounded(width: float) -> float:
-    return round(width, 6)
 
 
 def widest_disc(piece: Piece) -> float:

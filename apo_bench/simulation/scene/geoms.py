@@ -1,7 +1,7 @@
 """Convex pieces as geoms of MuJoCo: boxes and cylinders as what they are, everything else as the mesh of its corners.
 
 MuJoCo moves and turns a mesh into the frame of its own inertia, and the pose of the geom undoes that: corners in the
-frame of the part are found there again, where the geom has no pose of its own.
+frame of the part are found there again, where the geom has no pose.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ the pads', or the larger of the two."""
 _PADS_CONDIM = 4
 """Of contacts with pads: torsional friction, too."""
 _SURFACE = ("friction", "density", "rgba", "condim")
-"""What a geom has besides its shape."""
+"""What a geom has but its shape."""
 
 
 def add_pieces(spec: Any, body: Any, pieces: Iterable[Piece], surface: Mapping[str, Any], prefix: str = "") -> None:
@@ -39,7 +39,7 @@ def set_shape(spec: Any, geom: Any, piece: Piece) -> None:
         geom.pos = piece.center
         geom.size = piece.half
     elif piece.cylinder is None:
-        # corners are all that is said of a mesh, so its inertia is that of their hull
+        # corners are all that is known of a mesh, so its inertia is that of their hull
         convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         spec.add_mesh(name=geom.name, uservert=piece.corners.ravel(), inertia=convex)
         geom.type = mujoco.mjtGeom.mjGEOM_MESH

@@ -44,7 +44,7 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
     """Where the parts come to rest, (n, 4, 4), world frame, [m].
 
     Returns:
-        Bare goals, to be measured by whoever asked; a `Correction` with the status `not_seen` and unknown gaps where an
+        Bare goals, to be measured by the caller; a `Correction` with the status `not_seen` and unknown gaps where an
         operation was not seen; what was seen, from the operation on at which the simulation became unstable.
     """
     if not observation.observed.all():

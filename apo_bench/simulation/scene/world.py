@@ -95,24 +95,24 @@ def is_unstable(error: Exception, data: Any) -> bool:
 
 
 def allow_sleep(world: World, allowed: bool) -> AbstractContextManager[None]:
-    """Whether parts that rest and that nothing moves against are left as they are, for a while."""
+    """Let parts sleep, or not, for a while: those that rest and that nothing moves against."""
     flags = int(world.model.opt.enableflags)
     return _with_option(world.model, "enableflags", flags | SLEEP if allowed else flags & ~SLEEP)
 
 
 def timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
-    """Steps of another length, for a while."""
+    """Take steps of another length for a while."""
     return _with_option(model, "timestep", seconds)
 
 
 def sensors_off(model: Any) -> AbstractContextManager[None]:
-    """Steps after which no sensor is asked: they need not be computed for a while."""
+    """Switch all sensors off for a while."""
     return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
 
 
 @contextmanager
 def wrist_sensors_on(model: Any) -> Iterator[None]:
-    """Steps after which the sensors of the wrist are asked; else MuJoCo leaves them, and what only they need, out."""
+    """Compute the sensors of the wrist for a while, and what only they need."""
     sensors = [model.sensor(name).id for name in WRIST_SENSORS]
     before = model.sensor_needstage[sensors]
     model.sensor_needstage[sensors] = _WHEN_FELT
@@ -129,7 +129,7 @@ def disable_wrist_sensors(model: Any) -> None:
 
 @contextmanager
 def _with_option(model: Any, name: str, value: float) -> Iterator[None]:
-    """A model with another value of one of its options, for a while."""
+    """Give a model another value of one of its options for a while."""
     before = getattr(model.opt, name)
     setattr(model.opt, name, value)
     try:

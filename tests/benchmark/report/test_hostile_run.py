@@ -150,7 +150,7 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(
-    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
+    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_noise_level.svg"]
 )
 def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
     folder = write(tmp_path / "run", [row("contact")])

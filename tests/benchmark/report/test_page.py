@@ -201,7 +201,13 @@ def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
 def test_figures_are_files_that_stand_alone(made: Report) -> None:
     drawn = [path for path in made.figures if path.suffix == ".svg"]
     names = {path.stem for path in drawn}
-    assert {"success_over_level", "difference_to_paper", "failure_stages", "gap_before_and_after", "timing"} <= names
+    assert {
+        "success_over_noise_level",
+        "difference_to_paper",
+        "failure_stages",
+        "gap_before_and_after",
+        "timing",
+    } <= names
     for path in drawn:
         root = ElementTree.parse(path).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"

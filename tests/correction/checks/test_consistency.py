@@ -12,8 +12,8 @@ from scipy.stats import kstest
 
 from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct, correct_many
 from apo_bench.assembly import Consistency, Contact, PartFace
-from apo_bench.correction.checks.status import p_value
-from apo_bench.correction.contact.contact import MOST_SUSPECTS
+from apo_bench.correction.checks.chi_square import p_value
+from apo_bench.correction.contact.suspects import MOST_SUSPECTS
 from apo_bench.geometry import Face, pose
 from benchmarks.corrector_problems import problem
 from tests import scenes

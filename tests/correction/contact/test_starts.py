@@ -9,7 +9,8 @@ from apo_bench import ContactCorrector, correct
 from apo_bench.assembly import faces_away, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import compact_equations
-from apo_bench.correction.solvers.gauss_newton import descended, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
+from apo_bench.correction.solvers.newton_descent import descended
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown

@@ -6,7 +6,6 @@ from math import comb
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.correction.robust.test_looks import Again, at_the_same_place
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, placements
@@ -33,6 +32,7 @@ from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
 from apo_bench.trial.pose_error import goal_errors
+from tests.correction.robust.test_reobservations import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
 TOWER = "stick_in_tower"

@@ -8,7 +8,7 @@ import pytest
 from apo_bench.assembly import Hypothesis, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.robust.beliefs import mode_covariance
+from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, faces_away, largest_gap, placements
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import p_value
+from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.region import contains_truth

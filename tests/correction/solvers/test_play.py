@@ -8,7 +8,7 @@ import pytest
 from apo_bench import Demonstration, correct, correct_many, observe
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import fit_deviation, softened_chi_square
+from apo_bench.correction.checks.chi_square import fit_deviation, softened_chi_square
 from apo_bench.correction.contact.contact import contact_refuse
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals

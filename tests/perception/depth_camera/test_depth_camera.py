@@ -276,10 +276,10 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     drawn = figure_texts(out)
     for name, texts in drawn.items():
         assert not [text for text in texts if "deg" in text or "range noise" in text], name
-    for name in ("success_over_level", "gap_before_and_after"):
+    for name in ("success_over_noise_level", "gap_before_and_after"):
         assert {"level: mm per ray", "0.5"} <= set(drawn[name])
     assert "0.5 mm per ray" in drawn["detected"]
-    assert "range finder, relations recognised" in " ".join(drawn["success_over_level"])
+    assert "range finder, relations recognised" in " ".join(drawn["success_over_noise_level"])
 
 
 def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
         ]
     assert main(["report", str(out)]) == 0
     axis = "level: mm and degrees per axis; level: mm per ray"
-    assert axis in figure_texts(out)["success_over_level"]
+    assert axis in figure_texts(out)["success_over_noise_level"]
     page = pages.words(out / "report.html")
     assert "of the range finder it is one of L mm per ray" in page
 

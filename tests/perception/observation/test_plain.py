@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import InputError, observe
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.perception.observation.plain import Plain

@@ -20,8 +20,8 @@ from apo_bench.simulation.robot import (
     comply,
     part_loads,
     reading,
-    shifted,
-    smooth,
+    smooth_trajectory,
+    translate,
     with_height,
 )
 from apo_bench.simulation.scene import allow_sleep
@@ -47,9 +47,9 @@ CALM_RAD = 6e-4
 are averaged over `averaged_s`."""
 CALM_S = 0.1
 _SURELY = 3.0
-"""What is averaged has so many times less noise than tells lying."""
+"""What is averaged has so many times less noise than the limit."""
 LONGEST_S = 3.0
-"""A sensor that would have to be averaged longer cannot tell: nothing is laid then."""
+"""A sensor that would have to be averaged longer is too noisy: nothing is laid then."""
 MOST_S = 15.0
 DEEPEST_M = 0.012
 
@@ -65,23 +65,23 @@ def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, g
     T_before = robot.T
     held = pose.inverse(grip.T_part_tip @ pose.inverse(probing.residual.tool))
     robot.stage, robot.macro = "attach", "lay-flat"
-    robot.follow(smooth(robot.T, shifted(t.flat.T @ grip.T_part_tip, UP, NEAR_M), LAY_SPEED))
+    robot.follow(smooth_trajectory(robot.T, translate(t.flat.T @ grip.T_part_tip, UP, NEAR_M), LAY_SPEED))
     robot.stand()
     with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
         probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
-        touches = _laid(robot, probing, operation, t.flat, held)
+        touches = _press_flat(robot, probing, operation, t.flat, held)
         probing.wrist.hold()
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), _OFF))
     grip = probing.grip(operation, touches, held, grip)
     for place in t.side_touches:
         grip = touch_side(robot, probing, operation, t, place, grip, held)
     above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
-    robot.follow(smooth(robot.T, above, _UP))
+    robot.follow(smooth_trajectory(robot.T, above, _UP))
     robot.stand()
     return grip
 
 
-def _laid(robot: Robot, probing: ProbingState, operation: int, flat: FlatPlacement, held: Array) -> list[Touch]:
+def _press_flat(robot: Robot, probing: ProbingState, operation: int, flat: FlatPlacement, held: Array) -> list[Touch]:
     """Press the part on the floor until it lies; all its feet touch then."""
     law = _Laying(flat, averaged_s(flat, probing.wrist.sigma))
     # About the middle of the feet: there, what rubs has no lever.
@@ -97,10 +97,10 @@ def turn_yield(flat: FlatPlacement) -> float:
 
 
 def averaged_s(flat: FlatPlacement, sigma: tuple[float, float]) -> float:
-    """How long what is felt while a part is laid flat must be averaged, [s], so that noise looks like no motion.
+    """How long forces must be averaged while a part is laid flat, [s], so that noise looks like no motion.
 
     Args:
-        sigma: Of what is felt behind the low pass, [N] and [Nm].
+        sigma: Of force and torque behind the low pass, [N] and [Nm].
     """
     # An average over a time T has sqrt(t / T) of the noise of a low pass with the time constant t.
     turning = _SURELY * turn_yield(flat) * sigma[1] / CALM_RAD
@@ -123,7 +123,7 @@ class _Laying:
         self.lies = False
 
     def __call__(self, wrench: Array) -> Array | None:
-        """How far the hand shall be from where it began, (6,), world; None at the end."""
+        """How far the hand moves from where it began, (6,), world; None at the end."""
         push = float(wrench[:3] @ self._n)
         torque = wrench[3:] - (wrench[3:] @ self._n) * self._n
         down = float(np.clip(YIELD_M * (PRESS_N - push), -FASTEST, FASTEST))

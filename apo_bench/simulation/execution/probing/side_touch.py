@@ -10,9 +10,9 @@ from apo_bench.simulation.robot import (
     part_loads,
     press,
     reading,
-    shifted,
-    smooth,
-    steady,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
     with_height,
 )
 from apo_bench.simulation.scene import allow_sleep
@@ -37,20 +37,20 @@ def touch_side(
     T = place.T @ grip.T_part_tip
     high = max(t.safe, float(T[2, 3]))
     robot.macro = "touch-wall"
-    robot.follow(smooth(robot.T, with_height(robot.T, high), _DOWN))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _DOWN))
     robot.go(with_height(T, high), _CARRY)
-    robot.follow(smooth(robot.T, T, _DOWN))
+    robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
     touches = []
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
         probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
-        end = shifted(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
-        left = press(robot, steady(robot.T, end, SPEED), place.way, probing.touch_n, probing.wrist)
+        end = translate(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
+        left = press(robot, steady_trajectory(robot.T, end, SPEED), place.way, probing.touch_n, probing.wrist)
         if left is not None:
             n, d = probing.plane_by_camera(place.normal, place.edge)
             touches = [probing.touch(robot, n, d, place.point, (operation, held))]
         probing.wrist.hold()
-        robot.follow(smooth(robot.T, T, _DOWN))
-    robot.follow(smooth(robot.T, with_height(T, high), _DOWN))
+        robot.follow(smooth_trajectory(robot.T, T, _DOWN))
+    robot.follow(smooth_trajectory(robot.T, with_height(T, high), _DOWN))
     return probing.grip(operation, touches, held, grip)

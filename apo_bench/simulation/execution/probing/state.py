@@ -20,29 +20,29 @@ from apo_bench.simulation.robot import Robot, RobotError, WristSensor, wrist_of,
 from apo_bench.simulation.scene import Scene
 
 TOUCH_SIGMA_M = 3e-5
-"""How exactly a guarded touch tells a plane, [m]."""
+"""Standard deviation of a guarded touch of a plane, [m]."""
 FOOT_SIGMA_M = 1e-4
-"""How exactly a foot of a part that was laid flat stands on the floor, [m]: pressed on, it sinks by as much."""
+"""Standard deviation of a foot of a part that was laid flat on the floor, [m]: pressed on, it sinks by as much."""
 SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
-"""How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
+"""Standard deviations of a part between pads that closed twice, [m, rad], a twist of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
 _CORNERS = 3
 _FLAT_M = 1e-5
-"""Which corner of the hand touched is asked so often, as what is estimated changes; a patch that lies within the second
-touched with its middle."""
+"""The corner of the hand that touched is determined so often, as the estimate changes; a patch that lies within the
+second touched with its middle."""
 _OFF_SIGMAS = 3.0
 _TOUCH_N = 2.0
 _SIGMAS = 6.0
-"""A touch ends by this force, or by so many standard deviations of what the wrist feels."""
+"""A touch ends by this force, or by so many standard deviations of the sensor at the wrist."""
 
 
 def touch_guard(sigma_n: float) -> float:
-    """The force that ends a touch, [N], of a wrist that feels with this standard deviation, [N]."""
+    """The force that ends a touch, [N], of a sensor with this standard deviation, [N]."""
     return max(_TOUCH_N, _SIGMAS * sigma_n)
 
 
 class ProbingState:
-    """The state of a robot that feels, during one replay."""
+    """The state of a robot that probes, during one replay."""
 
     def __init__(self, probing: ProbingConfig, plan: Plan, scene: Scene, error: RobotError | None) -> None:
         none = np.eye(4)
@@ -55,7 +55,7 @@ class ProbingState:
         self._kinematics = scene.kinematics
         self._error = error or RobotError(none, joints, none, np.tile(none, (len(plan.assembly), 1, 1)))
         self.residual = self._error
-        """What is still wrong once commands make up for what is estimated."""
+        """The errors that remain after commands compensate for the estimate."""
 
     def begin(self, robot: Robot) -> None:
         """Zero the sensor at the wrist, in free air."""
@@ -79,13 +79,13 @@ class ProbingState:
         return _OFF_SIGMAS * float(np.sqrt(way @ covariance @ way))
 
     def plane_by_camera(self, normal: Array, point: Array) -> tuple[Array, float]:
-        """Normal and offset of a plane, (3,) and [m], in the world as the eye has it, from where the arm takes it."""
+        """A plane of the frame that the arm takes for the world, by normal, (3,), and offset, [m], in the camera's."""
         back = pose.inverse(self.residual.hand_eye)
         n = back[:3, :3] @ normal
         return n, float(n @ (back[:3, :3] @ point + back[:3, 3]))
 
     def estimated_tip(self, robot: Robot) -> Array:
-        """Where the robot would believe its tip if it made up for nothing, (4, 4), world."""
+        """Where the robot would estimate its tip without compensation, (4, 4), world."""
         left = self.residual
         measured = self._kinematics.forward(robot.encoders())
         corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)
@@ -96,7 +96,7 @@ class ProbingState:
         return self._kinematics.jacobian(robot.q)
 
     def learn(self, robot: Robot, felt: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
-        """Believe what was felt; from now on commands make up for it.
+        """Update the estimate by touches; from now on commands compensate for it.
 
         Args:
             felt: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
@@ -123,7 +123,7 @@ class ProbingState:
         return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])
 
     def note_grasp(self, operation: int) -> None:
-        """A part was taken between pads that closed twice; it may have slipped since."""
+        """Note that a part was picked between pads that closed twice; it may have slipped since."""
         self.estimate = self.estimate.grasp(operation, np.hypot(self._config.slip, SQUARED))
 
     def T_tip_held(self, T_tip_part: Array) -> Array:
@@ -132,14 +132,14 @@ class ProbingState:
         return np.asarray(pose.inverse(self.residual.tool) @ T_tip_part)
 
     def foot(self, robot: Robot, operation: int, flat: FlatPlacement, T_tip_part: Array, foot: Array) -> Touch:
-        """What a foot of the held part tells that stands on the floor."""
+        """The touch of a foot of the held part that stands on the floor."""
         n, d = self.plane_by_camera(flat.normal, pose.apply(flat.T, flat.feet[:1])[0])
         return self.touch(robot, n, d, foot, (operation, T_tip_part), FOOT_SIGMA_M)
 
     def grip(self, operation: int, touches: Sequence[Touch], T_tip_part: Array, grip: Grip) -> Grip:
-        """How a part is estimated to be held after what it told that touched.
+        """Update the estimate of how a part is held by its touches; returns the grip.
 
-        What hand and eye are off is not estimated anew: what has been put down stands where it was put.
+        The hand-eye error is not updated: what has been put down stands where it was put.
 
         Args:
             T_tip_part: Where it was estimated in the frame of the tip when it was taken, (4, 4).
@@ -157,7 +157,7 @@ class ProbingState:
         held: tuple[int, Array] | None = None,
         sigma_m: float = TOUCH_SIGMA_M,
     ) -> Touch:
-        """What touching a plane tells: the robot stands where it felt it.
+        """The touch of a plane: the robot stands where it touched.
 
         Args:
             held: The grasp, and where the part is estimated in the frame of the tip, (4, 4); None of an empty hand.

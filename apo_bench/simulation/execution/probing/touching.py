@@ -22,9 +22,9 @@ from apo_bench.simulation.robot import (
     Robot,
     press,
     reading,
-    shifted,
-    smooth,
-    steady,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
     turn_from,
     with_height,
 )
@@ -33,7 +33,7 @@ from apo_bench.simulation.scene import allow_sleep
 SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
 BEYOND_M = 0.001
-"""The floor or a wall is felt for so much farther beyond where it is expected than before."""
+"""The floor or a wall may be so much farther than expected."""
 _DOWN = 0.4
 _OVER = 0.8
 _BACK = 0.3
@@ -45,7 +45,7 @@ _HIGH_M = 0.1
 
 
 def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
-    """Touch the floor, then walls from where the floor has told to be; the robot believes what it felt after each.
+    """Touch the floor, then walls; the robot updates its calibration estimate after each.
 
     Raises:
         ExecutionAborted: The hand struck something, or a place is out of reach.
@@ -60,7 +60,7 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
         felt = list[tuple[Touch, Array]]()
         for place in those:
             try:
-                felt += _touched(robot, probing, place)
+                felt += _touch(robot, probing, place)
             except ExecutionAborted as aborted:
                 aborted.why = _room(robot, probing, place)
                 raise
@@ -80,23 +80,23 @@ def _room(robot: Robot, probing: ProbingState, place: TouchPlace) -> str:
     return f"{before} aside, and may be off by {1e3 * far:.1f} mm"
 
 
-def _touched(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple[Touch, Array]]:
-    """Go there, press, come back; what it tells, if anything was felt, and what of the hand may have touched."""
+def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple[Touch, Array]]:
+    """Go there, press, come back; the touch, if there was one, and what of the hand may have touched."""
     T = probing.residual.hand_eye @ place.T_world_tip @ probing.residual.tool
     way = probing.residual.hand_eye[:3, :3] @ place.way
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
-    robot.follow(smooth(robot.T, with_height(robot.T, high), _OVER))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _OVER))
     rest = robot.scene.kinematics.forward(robot.scene.arm.home)
     if abs(turn_from(rest, T) - turn_from(rest, robot.T)) > _HALF_TURN:
         robot.go(with_height(rest, high), _OVER)
     robot.go(with_height(T, high), _OVER)
-    robot.follow(smooth(robot.T, T, _DOWN))
+    robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
-        end = shifted(robot.T, way, 2.0 * place.stand_off + BEYOND_M)
-        left = press(robot, steady(robot.T, end, SPEED), way, probing.touch_n, probing.wrist)
+        end = translate(robot.T, way, 2.0 * place.stand_off + BEYOND_M)
+        left = press(robot, steady_trajectory(robot.T, end, SPEED), way, probing.touch_n, probing.wrist)
         touched = probing.touch(robot, place.normal, place.offset, place.patch.mean(axis=0))
-        robot.follow(smooth(robot.T, T, _BACK))
-    robot.follow(smooth(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
+        robot.follow(smooth_trajectory(robot.T, T, _BACK))
+    robot.follow(smooth_trajectory(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
     return [] if left is None else [(touched, place.patch)]

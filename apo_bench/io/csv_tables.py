@@ -3,16 +3,19 @@
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, NoReturn, final
+from typing import NamedTuple, final
 
 from apo_bench.errors import InputError, require, require_known
+from apo_bench.io.result_files import write_file
 from apo_bench.io.safe_io import read_text
 
 Columns = Mapping[str, tuple[str, float]]
 """Name of a column -> what it stands for, and the size of its unit."""
+_SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
+"""What spreadsheets of some countries put in place of commas."""
 
 
 class CsvCell(NamedTuple):
@@ -32,23 +35,19 @@ class CsvRow:
     line: int
     cells: Mapping[str, CsvCell]
 
-    def fail(self, meaning: str, wanted: str) -> NoReturn:
-        """Raise the `InputError` that says what is needed in a cell, and what was given."""
-        cell = self.cells[meaning]
-        stands = f"'{cell.text[:40]}' was given" if cell.text else "nothing was given"
-        raise InputError(f"{self.file}, line {self.line}, column {cell.column}: {wanted}, {stands}.")
-
     def require(self, holds: object, meaning: str, wanted: str) -> None:
-        """Raise that error unless something holds."""
+        """Raise the `InputError` that says what is needed in a cell, and what was given, unless something holds."""
         if not holds:
-            self.fail(meaning, wanted)
+            cell = self.cells[meaning]
+            given = f"'{cell.text[:40]}' was given" if cell.text else "nothing was given"
+            raise InputError(f"{self.file}, line {self.line}, column {cell.column}: {wanted}, {given}.")
 
     def text(self, meaning: str) -> str:
-        """The text of a cell; empty where the column is missing."""
+        """Return the text of a cell; empty where the column is missing."""
         return self.cells[meaning].text if meaning in self.cells else ""
 
     def number(self, meaning: str, largest: float) -> float:
-        """A finite number, in the unit that the size of the column's own unit is counted in."""
+        """Return a finite number, in the unit that the size of the column's own unit is counted in."""
         _, text, unit = self.cells[meaning]
         try:
             x = float(text) * unit
@@ -60,7 +59,7 @@ class CsvRow:
 
 
 def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Iterator[CsvRow]:
-    """Every row that is not empty, behind the first, which names the columns.
+    """Read every row that is not empty, behind the first, which names the columns.
 
     Args:
         columns: All that are allowed.
@@ -80,32 +79,42 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
     names = [name.lower() for name in head]
     _check_header(f"{path}, line {line}", names, columns, required)
     for line, texts in rows[1:]:
-        require(
-            len(texts) == len(names), f"{path}, line {line}: {len(names)} cells are needed, {len(texts)} were given."
-        )
-        cells = {
-            columns[name][0]: CsvCell(name, text, columns[name][1]) for name, text in zip(names, texts, strict=True)
-        }
-        yield CsvRow(str(path), line, cells)
+        count = len(texts)
+        require(count == len(names), f"{path}, line {line}: {len(names)} cells are needed, {count} were given.")
+        cells = [CsvCell(name, text, columns[name][1]) for name, text in zip(names, texts, strict=True)]
+        yield CsvRow(str(path), line, {columns[cell.column][0]: cell for cell in cells})
 
 
 def _check_header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> None:
-    """Every column is known, none stands for the same as another one, and none is missing."""
+    """Check that every column is known, that none stands for the same as another one, and that none is missing."""
     check_separator(place, names)
     for name in names:
         require_known("column", name, columns, place=place)
     meanings = [columns[name][0] for name in names]
     for name, meaning in zip(names, meanings, strict=True):
         require(meanings.count(meaning) == 1, f"{place}: another column says the same as '{name}'; keep one.")
-    for meaning in required:
-        wanted = next(name for name in columns if columns[name][0] == meaning)
-        require(meaning in meanings, f"{place}: the column '{wanted}' is missing.")
+    for wanted, (meaning, _) in columns.items():
+        present = meaning in meanings or meaning not in required
+        require(present, f"{place}: the column '{wanted}' is missing.")
 
 
 def check_separator(place: str, names: Sequence[str]) -> None:
-    """Refuse what spreadsheets of some countries put in place of commas."""
-    for separator, called in ((";", "';'"), ("\t", "tabs"), ("|", "'|'")):
+    """Refuse names of columns that are separated otherwise than by commas."""
+    for separator, called in _SEPARATORS.items():
         require(
             len(names) != 1 or separator not in names[0],
             f"{place}: columns are separated by commas; this file uses {called}, so save it with commas.",
         )
+
+
+def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table; None is an empty field, and numbers stay numbers.
+
+    Raises:
+        InputError: As `replace_file`.
+    """
+    table = io.StringIO(newline="")
+    writer = csv.writer(table)
+    writer.writerow(head)
+    writer.writerows(rows)
+    write_file(path, table.getvalue())

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, event, given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from apo_bench import InputError, Observation, Plan, Scenario, load_scenario
+from apo_bench import InputError, Observation, Plan, load_scenario
 from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, first_order
-from apo_bench.formats import json_forms as files
-from apo_bench.formats import json_reading
+from apo_bench.formats.observation import read_stated
+from apo_bench.formats.observation_json import observation_form, read_json_observation
+from apo_bench.formats.plan_json import plan_form
 from apo_bench.geometry import pose
 
 SCENARIO = load_scenario("stick_in_tower")
@@ -41,7 +42,7 @@ def observation(seed: int = 0) -> Observation:
 
 
 def form() -> dict[str, Any]:
-    return files.observation_form(with_shared(observation()), "stick_in_tower")
+    return observation_form(with_shared(observation()), "stick_in_tower")
 
 
 def with_shared(seen: Observation) -> Observation:
@@ -55,21 +56,21 @@ def with_shared(seen: Observation) -> Observation:
     return replace(seen, shared=(camera, drift, SharedError("castle1", (0,), C)), tails=tails)
 
 
-def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) -> Observation:
+def read(tmp_path: Path, document: Any) -> Observation:
     path = tmp_path / "seen.json"
-    path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
-    return json_reading.read_json_observation(path, scenario)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return read_json_observation(path, SCENARIO, (1.0, 1.0))[0]
 
 
 def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None:
     stated = replace(observation(), outliers=OutlierModel(0.24, 0.05, 8.0, 0.002))
-    assert read(tmp_path, files.observation_form(stated, "stick_in_tower")).outliers == stated.outliers
+    assert read(tmp_path, observation_form(stated, "stick_in_tower")).outliers == stated.outliers
     assert read(tmp_path, form()).outliers is None
     some = read(tmp_path, form() | {"outliers": {"gross_rate": 0.3}})
     assert some.outliers == OutlierModel(0.3)
     with pytest.raises(InputError, match=r"seen\.json, outliers: rates of 1\.5 gross"):
         read(tmp_path, form() | {"outliers": {"gross_rate": 1.5}})
-    with pytest.raises(InputError, match="unknown key 'gros_rate'; did you mean 'gross_rate'"):
+    with pytest.raises(InputError, match=r"unknown key 'gros_rate' .did you mean 'gross_rate'"):
         read(tmp_path, form() | {"outliers": {"gros_rate": 0.1}})
 
 
@@ -77,7 +78,7 @@ def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None
 @given(seed=st.integers(0, 2**32))
 def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
     seen = observation(seed)
-    back = read(tmp_path, files.observation_form(seen, "stick_in_tower"))
+    back = read(tmp_path, observation_form(seen, "stick_in_tower"))
     np.testing.assert_allclose(back.poses, seen.poses, rtol=0, atol=1e-13)
     np.testing.assert_allclose(back.covariance, seen.covariance, rtol=1e-12, atol=0)
     assert back.observed.tolist() == seen.observed.tolist()
@@ -88,53 +89,14 @@ def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
         np.testing.assert_allclose(back.start[part], T, rtol=0, atol=1e-13)
 
 
-@QUICK
-@given(seed=st.integers(0, 2**32))
-def test_a_plan_comes_back_with_its_targets(seed: int, tmp_path: Path) -> None:
+def test_a_plan_states_the_poses_of_steps_that_are_not_target_poses() -> None:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    targets = observation(seed).poses[[0, 1, 1, 2, 2]]
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(seed).poses[[0, 2, 2]], schedule, targets)
-    form = files.plan_form(plan, "stick_in_tower")
+    seen = observation().poses
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, seen[[0, 2, 2]], schedule, seen[[0, 1, 1, 2, 2]])
+    form = plan_form(plan, "stick_in_tower")
     assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
-    files.write_form(form, tmp_path / "plan.json")
-    back = json_reading.read_plan(tmp_path / "plan.json", SCENARIO)
-    assert back.schedule == schedule
-    np.testing.assert_allclose(back.step_poses, targets, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(back.target_poses, plan.target_poses, rtol=0, atol=1e-13)
-
-
-def test_a_plan_without_a_schedule_does_everything_once(tmp_path: Path) -> None:
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).poses)
-    form = files.plan_form(plan, "stick_in_tower") | {"schedule": []}
-    files.write_form(form, tmp_path / "plan.json")
-    back = json_reading.read_plan(tmp_path / "plan.json")
-    assert back.schedule == plan.schedule == (Step(0), Step(1), Step(2))
-    np.testing.assert_array_equal(back.step_poses, back.target_poses)
-
-
-HALF = {"operation": 1, "position_mm": [0.0, 0.0, 0.0]}
-WRONG = HALF | {"quaternion_wxyz": [2, 0, 0, 0]}
-
-
-@pytest.mark.parametrize(
-    ("schedule", "words"),
-    [
-        ([{"operation": 1}, {"operation": 2}], "schedule: it leaves operation 3 undone; do operations in order"),
-        ([{"operation": 2}], "schedule: it does operation 2 before operation 1"),
-        ([{"operation": 1, "undo": True}], "schedule: it undoes operation 1, which is not done"),
-        ([{"operation": 4}], "schedule: an operation from 1 to 3 is needed"),
-        ([HALF, {"operation": 2}, {"operation": 3}], "position_mm and quaternion_wxyz are needed together"),
-        ([WRONG, {"operation": 2}, {"operation": 3}], "quaternion_wxyz: a quaternion of length 1"),
-        ([{"operation": 1, "pose": 1}], "unknown key 'pose'"),
-    ],
-)
-def test_a_schedule_that_makes_no_sense_is_refused(schedule: Any, words: str, tmp_path: Path) -> None:
-    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).poses)
-    files.write_form(files.plan_form(plan, "stick_in_tower") | {"schedule": schedule}, tmp_path / "plan.json")
-    with pytest.raises(InputError) as refused:
-        json_reading.read_plan(tmp_path / "plan.json")
-    assert words in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert [entry["undo"] for entry in form["schedule"]] == [False, False, True, False, False]
+    assert form["operations"][0]["position_mm"] == pytest.approx((1e3 * seen[0, :3, 3]).tolist())
 
 
 def test_files_speak_mm_degrees_and_count_from_one() -> None:
@@ -142,7 +104,7 @@ def test_files_speak_mm_degrees_and_count_from_one() -> None:
     goals[2, :3, 3] = [0.1, -0.2, 0.3]
     covariance = np.tile(np.diag([1e-6] * 3 + [np.radians(2.0) ** 2] * 3), (N, 1, 1))
     seen = Observation(SCENARIO.assembly, SCENARIO.start, goals, covariance, np.ones(N, dtype=bool))
-    entry = files.observation_form(seen, "stick_in_tower")["operations"][2]
+    entry = observation_form(seen, "stick_in_tower")["operations"][2]
     assert (entry["operation"], entry["part"]) == (3, "stick")
     assert entry["position_mm"] == pytest.approx([100.0, -200.0, 300.0])
     assert np.diag(entry["covariance_mm_deg"]) == pytest.approx([1.0] * 3 + [4.0] * 3)
@@ -150,33 +112,17 @@ def test_files_speak_mm_degrees_and_count_from_one() -> None:
 
 def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
     document = form()
-    del document["start"], document["gap_mm"]
+    del document["start"], document["gap_mm"], document["play_mm"]
     for entry in document["operations"]:
         del entry["covariance_mm_deg"], entry["seen"]
         entry |= {"deviation_mm": 2.0, "deviation_deg": 0.5}
     back = read(tmp_path, document)
     assert np.diag(back.covariance[0]) == pytest.approx([4e-6] * 3 + [np.radians(0.5) ** 2] * 3)
     assert back.observed.all()
-    assert back.gap_m == SCENARIO.gap_mm * 1e-3
+    assert (back.gap_m, back.play_m) == (SCENARIO.gap_mm * 1e-3, SCENARIO.clearance_mm * 1e-3)
     np.testing.assert_array_equal(back.start["castle1"], SCENARIO.start["castle1"])
     lowered = SCENARIO.start["stick"][2, 3] - back.start["stick"][2, 3]
     assert lowered == pytest.approx(SCENARIO.clearance_mm * 1e-3)
-
-
-def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None:
-    from apo_bench.resources import folder
-
-    (tmp_path / "mine.toml").write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
-    back = read(tmp_path, form() | {"scenario": "mine.toml"}, None)
-    assert [operation.main for operation in back.assembly.operations] == ["castle1", "castle2", "stick"]
-
-
-def test_the_scenario_must_be_the_one_asked_for(tmp_path: Path) -> None:
-    path = tmp_path / "seen.json"
-    path.write_text(json.dumps(form()))
-    assert json_reading.read_json_observation(path, SCENARIO).assembly is SCENARIO.assembly
-    with pytest.raises(InputError, match=r"scenario: .*stick_on_castles"):
-        json_reading.read_json_observation(path, load_scenario("stick_on_castles"))
 
 
 def test_shared_errors_come_back_and_may_be_left_out(tmp_path: Path) -> None:
@@ -225,26 +171,24 @@ BROKEN = {
     "another schema": (_set("schema", to="apo-bench/observation/3"), '"apo-bench/observation/2" is needed'),
     "shared by operation 4": (_set("shared", 0, "operations", to=[1, 4]), "operations from 1 to 3"),
     "shared, lopsided": (_set("shared", 1, "correlation", 0, 1, to=0.5), "with 1 on its diagonal is needed"),
-    "shared, local in no frame": (_set("shared", 2, "local", to=True), "state the frame, or leave this out"),
-    "tails of no freedom": (_set("tails", "degrees_of_freedom", to=[0.1, 1, 1, 1]), "a number >= 0.4 is needed"),
     "tails of no axes": (_set("tails", "axes", 0, 0, 0, to=3.0), "a rotation matrix for each operation is needed"),
     "an unknown key in an operation": (
         _set("operations", 1, "sen", to=True),
         "operation 2: unknown key 'sen' (did you",
     ),
-    "another scenario": (_set("scenario", to="stick_in_towr"), 'the scenario "stick_in_tower" was asked for'),
-    "an operation too few": (_drop("operations", 2), "3 entries are needed, 2 were given"),
-    "a wrong part": (_set("operations", 0, "part", to="stick"), 'operation 1, part: "castle1" is needed'),
-    "a short position": (_set("operations", 0, "position_mm", to=[1.0, 2.0]), "position_mm: a list of length 3"),
+    "another scenario": (
+        _set("scenario", to="stick_in_towr"),
+        "the file is of 'stick_in_towr', not of 'stick_in_tower'",
+    ),
+    "an operation too few": (_drop("operations", 2), "3 entries are needed, not 2"),
+    "a wrong part": (_set("operations", 0, "part", to="stick"), "state operation 1 of 'castle1'"),
     "far away": (_set("operations", 0, "position_mm", to=[1.0, 2.0, 1e200]), "position_mm 3: a number <= 10000000"),
     "a long quaternion": (_set("operations", 0, "quaternion_wxyz", to=[1.0, 0.1, 0.0, 0.0]), "length 1"),
     "a lopsided covariance": (_lopsided, "covariance_mm_deg: a symmetric"),
-    "no covariance": (_drop("operations", 0, "covariance_mm_deg"), "operation 1: state either"),
     "a tiny covariance": (
         _set("operations", 0, "covariance_mm_deg", to=(1e-9 * np.eye(6)).tolist()),
         "covariance_mm_deg: the square root of a variance is out of range",
     ),
-    "an unknown part at the start": (_set("start", "castle3", to=form()["start"]["stick"]), "unknown part 'castle3'"),
     "a part without a start": (_drop("start", "stick"), "'stick' is missing"),
 }
 
@@ -262,55 +206,20 @@ def test_a_broken_observation_is_refused_in_one_sentence(case: str, tmp_path: Pa
     assert message.endswith(".")
 
 
-def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
+def test_deviations_may_be_assumed(tmp_path: Path) -> None:
     document = form()
     del document["operations"][0]["covariance_mm_deg"]
-    first = document["operations"][1]
     second = document["operations"][2]
     del second["covariance_mm_deg"]
     second |= {"deviation_mm": 3.0, "deviation_deg": 0.25}
     path = tmp_path / "some.json"
     path.write_text(json.dumps(document), encoding="utf-8-sig")
-    seen, assumed = json_reading.read_json_observed(path, SCENARIO, (2.0, 0.5))
+    seen, assumed = read_json_observation(path, SCENARIO, (2.0, 0.5))
     assert assumed
     found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
     np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.25)]])
-    np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
-    with pytest.raises(InputError, match="operation 1: state either"):
-        json_reading.read_json_observation(path, SCENARIO)
+    with pytest.raises(InputError, match="standard deviations are missing"):
+        read_stated(path, SCENARIO)
     del second["deviation_deg"]
-    path.write_text(json.dumps(document))
-    with pytest.raises(InputError, match="operation 3: state either"):
-        json_reading.read_json_observed(path, SCENARIO, (2.0, 0.5))
-    second["deviation_deg"] = 200.0
-    with pytest.raises(InputError, match=r"operation 3, deviation_deg: a number <= 180.0 is needed, 200.0 was given"):
+    with pytest.raises(InputError, match="operation 3: state both"):
         read(tmp_path, document)
-
-
-JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=7) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
-    max_leaves=10,
-)
-
-
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(value=JSON, data=st.data())
-def test_any_value_anywhere_is_read_or_refused(value: Any, data: st.DataObject, tmp_path: Path) -> None:
-    document = form()
-    place: Any = document
-    key: Any = data.draw(st.sampled_from(sorted(document)))
-    while isinstance(place[key], (dict, list)) and place[key] and data.draw(st.booleans()):
-        place = place[key]
-        key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
-    place[key] = value
-    try:
-        back = read(tmp_path, document)
-    except InputError as refused:
-        event("refused")
-        if "\n" in str(refused):
-            raise
-    else:
-        event("read")
-        assert np.isfinite(back.poses).all()
-        assert (np.linalg.eigvalsh(back.covariance) > 0).all()

@@ -19,12 +19,12 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
-    goals = displaced(demonstration.poses, xi)
-    stated = floored(covariance + demonstration.human_error_covariance)
+    goals = displace(demonstration.poses, xi)
+    stated = floor_covariance(covariance + demonstration.human_error_covariance)
     return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
-def displaced(goals: Array, xi: Array) -> Array:
+def displace(goals: Array, xi: Array) -> Array:
     """`T exp(xi)` of goals (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
     return np.where(np.any(xi, axis=1, keepdims=True)[..., None], goals @ pose.exp(xi), goals)
 
@@ -56,7 +56,7 @@ def with_shared(observation: Observation, *shared: SharedError) -> Observation:
     return replace(observation, covariance=stated, shared=(*observation.shared, *shared))
 
 
-def floored(covariance: Array) -> Array:
+def floor_covariance(covariance: Array) -> Array:
     """The least covariance (n, 6, 6) above the given one that says at least `COVARIANCE_FLOOR` in every direction.
 
     In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.

@@ -9,26 +9,26 @@ from shapely import Polygon
 from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
 from apo_bench.scenario.parts.making.body import Body
-from apo_bench.scenario.parts.making.cells import clipped, wedges
+from apo_bench.scenario.parts.making.cells import clip, cut_wedges
 from apo_bench.scenario.parts.making.extrude import flat_face
 from apo_bench.scenario.parts.making.frustums import (
     Frustum,
     at_height,
-    chamfered,
+    chamfer,
+    circumscribe_polygon,
     heights_of,
-    inscribed,
-    raised,
-    tangent,
-    without,
+    inscribe_polygon,
+    raise_to,
+    subtract_steps,
 )
-from apo_bench.scenario.parts.making.moments import summed
+from apo_bench.scenario.parts.making.moments import sum_moments
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
 
 
 @check_arguments
-def turned(
+def revolve(
     outer: Sequence[Frustum],
     inner: Sequence[Frustum] = (),
     *,
@@ -47,14 +47,14 @@ def turned(
         fit: Which flat faces, by name, recede by the clearance.
     """
     heights = heights_of((*outer, *inner))
-    moments = summed(outer[0].moments(), (step.moments() for step in outer[1:]))
+    moments = sum_moments(outer[0].moments(), (step.moments() for step in outer[1:]))
     pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(
         tuple(pieces),
         tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""), fit)),
         tuple(rounds),
-        without(moments, inner).in_metres,
+        subtract_steps(moments, inner).in_metres,
     )
 
 
@@ -71,8 +71,8 @@ def shaft(
     top: str = "",
 ) -> Body:
     """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
-    steps = chamfered(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
-    return turned(steps, flats={low: bottom, high: top})
+    steps = chamfer(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
+    return revolve(steps, flats={low: bottom, high: top})
 
 
 def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
@@ -91,17 +91,17 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
     else:
         n = max(around.count, bore.count)
         for (u, first), (_, last) in zip(
-            *[wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
+            *[cut_wedges(inscribe_polygon((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
         ):
-            ends = [(clipped(first, -u, -bore.at(a)), a), (clipped(last, -u, -bore.at(b)), b)]
-            yield Hull("", 1e-3 * np.concatenate([raised(*end) for end in ends]))
+            ends = [(clip(first, -u, -bore.at(a)), a), (clip(last, -u, -bore.at(b)), b)]
+            yield Hull("", 1e-3 * np.concatenate([raise_to(*end) for end in ends]))
 
 
 def _ring(radius: float, sides: int, z: float) -> Array:
     """The corners of a level polygon on a circle; its middle, if it is a point."""
     if radius < _SAME_MM:
         return np.array([[0.0, 0.0, z]])
-    return raised(inscribed((0.0, 0.0), radius, sides), z)
+    return raise_to(inscribe_polygon((0.0, 0.0), radius, sides), z)
 
 
 def _flats(
@@ -113,8 +113,8 @@ def _flats(
         R, n = at_height(outer, z, above)
         r, k = at_height(inner, z, above)
         n, k = (max(n, k), max(n, k)) if n and k else (n, k)
-        disc = Polygon(inscribed((0.0, 0.0), R, n)) if R else Polygon()
-        areas.append(disc.difference(Polygon(tangent((0.0, 0.0), r, k))) if r else disc)
+        disc = Polygon(inscribe_polygon((0.0, 0.0), R, n)) if R else Polygon()
+        areas.append(disc.difference(Polygon(circumscribe_polygon((0.0, 0.0), r, k))) if r else disc)
     below, over = areas
     for rest, up in ((below.difference(over), True), (over.difference(below), False)):
         for polygon in polygons_of(rest):

@@ -47,7 +47,7 @@ class Station(NamedTuple):
     """Parts that stand beside the board and are bolted down, too."""
 
 
-class Assembled(NamedTuple):
+class GeneratedAssembly(NamedTuple):
     """A whole assembly."""
 
     title: str
@@ -79,7 +79,7 @@ def split(rng: np.random.Generator, total: int, least: Sequence[int], most: Sequ
     return counts
 
 
-def shifted(station: Station, x: float) -> Station:
+def shift_station(station: Station, x: float) -> Station:
     """A station at another place along the board."""
     return station._replace(
         acts=tuple(act._replace(at=(act.at[0] + x, *act.at[1:])) for act in station.acts),
@@ -89,7 +89,7 @@ def shifted(station: Station, x: float) -> Station:
     )
 
 
-def merged(rng: np.random.Generator, orders: Sequence[Sequence[Act]]) -> tuple[Act, ...]:
+def merge_orders(rng: np.random.Generator, orders: Sequence[Sequence[Act]]) -> tuple[Act, ...]:
     """Operations of several stations, one after another at random, those of each in their own order."""
     turns = rng.permutation([i for i, order in enumerate(orders) for _ in order])
     left = [iter(order) for order in orders]
