@@ -89,7 +89,10 @@ def test_a_wrong_argument_is_one_sentence(wrong: dict[str, Any], said: str) -> N
 def test_one_trial_takes_a_scenario_and_keywords() -> None:
     asked: dict[str, Any] = {"noise_level": (2, 1), "seed": 3, "human_error_scale": 0, "fidelity": "near-contact"}
     by_name = apo_bench.run_trial("block_on_block", method="uncorrected", **asked)
-    own = apo_bench.run_trial(apo_bench.load_scenario("block_on_block"), method=as_observed, **asked)
+    scenario = apo_bench.load_scenario("block_on_block")
+    own = apo_bench.run_trial(scenario, method=as_observed, **asked)
+    (again,) = apo_bench.evaluate(as_observed, scenario=scenario, **{**asked, "noise_level": [(2, 1)]}, seeds=1).records
+    assert again["reached"] == own["reached"]
     assert (by_name["noise_mm"], by_name["noise_deg"], by_name["clearance_mm"]) == (2.0, 1.0, 0.25)
     assert own["reached"] == by_name["reached"]
     assert own["method"].endswith(":as_observed")

@@ -121,4 +121,4 @@ def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.M
     for name in SETTINGS:
         assert f"| `{name}` | " in pages.settings_page()
     for column in RECORD_FIELDS:
-        assert f"| `{column}` | " in pages.row_page()
+        assert f"| `{column}` | " in pages.record_page()

@@ -149,7 +149,7 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("name", sorted([*NOISES, *presets()]))
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
-    """Written by `python docs/noise.py`."""
+    """Written by `python docs/noise_sheets.py`."""
     page = (Path(__file__).parents[3] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
     where = "at 1 times the measured mm and 1 times the measured degrees" if name in presets() else "at 1 mm and 1 deg"
     assert f"{describe_model(name, 2)}\nErrors {where}, " in page
