@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.viz.noise_sheet import SCENARIO, draw_errors, list_models, nominal_demonstration, noise_sheet
+from apo_bench.viz.noise_sheet import SCENARIO, draw_errors, list_models, noise_sheet, nominal_demonstration
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"

@@ -82,9 +82,9 @@ def _describe_success(scenario: Scenario) -> Iterator[str]:
     yield (
         f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
         f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
-        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside another; no parts that touch slid "
-        f"against each other by more than {t.displaced_mm:g} mm; all parts released and slower than {t.rest_mm_s:g} "
-        f"mm/s and {t.rest_deg_s:g} degrees/s."
+        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
+        f"another; no parts that touch slid against each other by more than {t.displaced_mm:g} mm; all parts released "
+        f"and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
     )
     if wider := sorted(_list_wider(scenario)):
         limits = "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in wider)
