@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import Arm, InputError, TrialConfig, build_scene, load_scenario, read_arm, run_trial
+from apo_bench import Arm, InputError, TrialConfig, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.records.own_code import own_code
 from apo_bench.resources import folder
@@ -16,9 +16,7 @@ from apo_bench.simulation.arm_checks.arm_check import check_arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import smooth_trajectory
-from apo_bench.simulation.robot.reach import along, follow_waypoints, limit_speed, plan_waypoints
-from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints
 from apo_bench.viz.arm_text import check_lines
 
 ARMS = folder("assets") / "arms"
@@ -126,25 +124,6 @@ def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) 
         np.testing.assert_allclose(kinematics.forward(reached), T, atol=2e-5)
         q = reached
     np.testing.assert_allclose(q, arm.home, atol=1e-3)
-
-
-def test_a_line_takes_as_long_as_the_joints_need() -> None:
-    arm = find_arm("ur5e_primitive")
-    kinematics = Kinematics(arm)
-    q = np.array(arm.home)
-    end = kinematics.forward(q)
-    end[:3, 3] += (0.1, 0.2, -0.1)
-    line = smooth_trajectory(kinematics.forward(q), end, 5.0)
-    most = np.full(6, 0.5)
-    slower, knots = limit_speed(kinematics, line, q, most)
-    t = np.linspace(0.0, 1.0, 201)
-    path = along(kinematics, slower, slower.progress(t), q)
-    assert path is not None
-    fastest = np.abs(np.gradient(path, slower.seconds / 200, axis=0)).max()
-    assert fastest == pytest.approx(0.5, rel=0.02)
-    assert limit_speed(kinematics, line, q, np.full(6, 50.0))[0] is line
-    shared = along(kinematics, slower, slower.progress(t), q, knots)
-    assert np.array_equal(shared, path), "what was solved for the speed is what would be solved again"
 
 
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
@@ -255,17 +234,6 @@ def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> N
     assert len(plan_waypoints(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
 
 
-def test_an_arm_waits_with_no_joint_wound_up() -> None:
-    """A Panda's tip may wait at any of four turns: the usual posture, elbow up, is among those."""
-    arm = replace(find_arm("panda_primitive"), base=(-0.48, 0.0, 0.0))
-    q = with_home(arm, base_is_stated=True).home
-    kinematics = Kinematics(arm)
-    low, high = kinematics.range_of_joints
-    assert (np.minimum(q - low, high - q) > np.radians(15.0)).all()
-    assert (np.abs(q) <= np.pi).all()
-    assert kinematics.forward(q)[2, 2] == pytest.approx(-1.0, abs=1e-4)
-
-
 def test_an_arm_that_is_short_stands_nearer_unless_its_base_is_stated() -> None:
     far = replace(find_arm("ur5e_primitive"), base=(-1.9, 0.0, 0.0))
     nearer = with_home(far, base_is_stated=False)
@@ -346,17 +314,6 @@ def test_the_usual_arm_is_what_its_file_states() -> None:
     assert (arm.tip, arm.fingers, arm.grip, arm.mount) == ("tip", ("left_finger", "right_finger"), "grip", "gripper")
     assert (arm.opening_m, arm.hand, arm.control) == (0.046, None, "own position actuators")
     assert [path.name for path in arm.files] == ["six_axis.toml", "six_axis.xml"]
-
-
-def test_the_base_of_a_stated_arm_may_be_turned(tmp_path: Path) -> None:
-    turned = read_arm(stated(tmp_path, ("[-420, 0, 0] }", "[0, 420, 0], turn_deg = [0, 0, -90] }")))
-    scene = build_scene(load_scenario("block_on_block"), arm=turned)
-    there = scene.kinematics.forward(turned.home)
-    usual = Kinematics(read_arm(stated(tmp_path))).forward(turned.home)
-    x, y, z = usual[:3, 3]
-    np.testing.assert_allclose(there[:3, 3], [y, -x, z], atol=1e-12)
-    robot = Robot(scene, scene.scenario.start)
-    np.testing.assert_allclose(robot.data.site("arm/tip").xpos, there[:3, 3], atol=1e-12)
 
 
 @pytest.mark.parametrize(
