@@ -20,7 +20,7 @@ def with_gripper(folder: Path, arm: str) -> Path:
     (folder / "arm.xml").write_text(arm)
     path = folder / "arm.toml"
     home = "base = { at_mm = [-480, 0, 0] }\nhome_deg = [18, -79, -105, -86, 90, -72]\n"
-    gripper = f'[gripper]\nmjcf = "{ARMS / "linkage_gripper.xml"}"\n'
+    gripper = f'[gripper]\nmjcf = "{ARMS / "linkage_gripper.xml"}"\nhand = "linkage_gripper"\n'
     path.write_text(f'schema = "apo-bench/arm/1"\nmjcf = "arm.xml"\n{home}{gripper}')
     return path
 
@@ -66,7 +66,7 @@ def test_an_arm_in_parts_with_materials_in_its_classes_is_built(tmp_path: Path) 
     assert arm.opening_m == pytest.approx(plain.opening_m, abs=1e-4)
     names = {each.name for each in named_files(tmp_path / "arm.xml")}
     assert names == {"arm.xml", "rest.xml", "link.obj"}
-    assert {each.name for each in arm.files} == {*names, "arm.toml", "linkage_gripper.xml"}
+    assert {each.name for each in arm.files} == {*names, "arm.toml", "linkage_gripper.xml", "linkage_gripper.toml"}
 
 
 def test_meshes_are_found_where_the_compiler_says(tmp_path: Path) -> None:
