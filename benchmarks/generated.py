@@ -22,8 +22,8 @@ from apo_bench.scenario.parts.making import (
     join,
     polygon,
     rectangle,
+    revolve,
     shaft,
-    turned,
     write_part,
 )
 
@@ -94,10 +94,10 @@ def bushed(between: Between, rng: np.random.Generator) -> Assembled:
     block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
     inner = [Frustum(0, thick + flange, r + play, name="bore")]
     walls = [Frustum(0, thick, outer, name="side"), Frustum(thick, thick + flange, outer + 4, name="rim")]
-    bush = turned(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
+    bush = revolve(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
     long = thick + flange - 2
     head = between(12, 16)
-    pin = turned(
+    pin = revolve(
         [Frustum(0, long, r, name="side"), Frustum(long, long + head, r + 3, name="grip")],
         flats={0.0: "tip", long: "ledge", long + head: "head"},
     )
@@ -173,7 +173,7 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
         r, 0, round(high + between(24, 30), 1), "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head"
     )
     thick = between(10, 14)
-    ring = turned(
+    ring = revolve(
         [Frustum(0, thick, r + between(6, 8), name="side")],
         [Frustum(0, thick, r + play, name="bore")],
         flats={0.0: "bottom", thick: "top"},
@@ -207,7 +207,9 @@ def stacked(between: Between, rng: np.random.Generator) -> Assembled:
         places.append(Place(f"plate_{i}", f"plate_{i}", (0, 0, round(z, 1))))
         z += h
     inner = [Frustum(0, 10, r + play, name="bore")]
-    parts["cap"] = turned([Frustum(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"})
+    parts["cap"] = revolve(
+        [Frustum(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"}
+    )
     places.append(Place("cap", "cap", (0, 0, round(z, 1))))
     return Assembled(parts, tuple(places))
 

@@ -97,7 +97,7 @@ def test_the_python_that_is_refused_is_refused_with_the_reason_in_one_line(name:
 
 
 def test_results_say_which_mujoco_they_were_simulated_with() -> None:
-    without_physics = {"corrector", "foreign"}
+    without_physics = {"corrector"}
     silent = [
         page.stem
         for page in (ROOT / "docs" / "results").glob("*.md")

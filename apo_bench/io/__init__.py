@@ -1,7 +1,6 @@
 """Read and write files within limits, and start processes; knows nothing of assemblies."""
 
-from apo_bench.io.csv_reading import Columns, CsvRow, check_separator, read_csv
-from apo_bench.io.csv_writing import write_csv
+from apo_bench.io.csv_tables import Columns, CsvRow, check_separator, read_csv, write_csv
 from apo_bench.io.documents import (
     Finite,
     NotNegative,
@@ -19,7 +18,6 @@ from apo_bench.io.documents import (
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.grouping import grouped
 from apo_bench.io.named_files import named_files
-from apo_bench.io.nodes import JsonNode, read_toml
 from apo_bench.io.parquet import has_parquet, write_columns
 from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.io.result_files import check_target, open_to_append, replace_file, write_file
@@ -35,7 +33,6 @@ __all__ = (
     "Columns",
     "CsvRow",
     "Finite",
-    "JsonNode",
     "NotNegative",
     "Positive",
     "Quadruple",
@@ -66,7 +63,6 @@ __all__ = (
     "read_csv",
     "read_plain",
     "read_text",
-    "read_toml",
     "read_typed",
     "redirect_output",
     "replace_file",

@@ -9,7 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from apo_bench import __version__
-from apo_bench.formats.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
+from apo_bench.formats.observation_json import OBSERVATION_SCHEMA
+from apo_bench.formats.plan_json import PLAN_SCHEMA
 from apo_bench.records import RECORD_SCHEMA, TrialConfig
 from apo_bench.scenario import Scenario
 from apo_bench.trial.inputs import content_pieces, digest, noise_content, own_content

@@ -24,7 +24,7 @@ from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.records.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
-from apo_bench.scenario.parts import part_files_of
+from apo_bench.scenario.parts import read_part
 
 _CHUNK = 1 << 20
 
@@ -43,7 +43,7 @@ def content_pieces(
     """
     thresholds = json.dumps(asdict(scenario.thresholds), sort_keys=True).encode()
     files = {
-        **{f"part {part}": part_files_of(path) for part, path in sorted(scenario.part_files.items())},
+        **{f"part {part}": read_part(path).files for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml",),
         "arm": arm_files if isinstance(arm_files, tuple) else (arm_files,),
         "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),

@@ -7,8 +7,9 @@ from typing import Any, final
 
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
-from apo_bench.formats.json_forms import observation_form, write_form
+from apo_bench.formats.json_forms import write_form
 from apo_bench.formats.observation import read_observation_file, read_stated
+from apo_bench.formats.observation_json import observation_form
 from apo_bench.io import read_text
 from apo_bench.records import (
     DEPTH_CAMERA,

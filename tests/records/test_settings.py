@@ -16,7 +16,7 @@ from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
-from apo_bench.cli.setting_options import sweep_options, trial_options
+from apo_bench.cli.shared.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import (
     KEY,
@@ -121,4 +121,4 @@ def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.M
     for name in SETTINGS:
         assert f"| `{name}` | " in pages.settings_page()
     for column in RECORD_FIELDS:
-        assert f"| `{column}` | " in pages.row_page()
+        assert f"| `{column}` | " in pages.record_page()

@@ -36,7 +36,7 @@ from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.records import USUAL, TrialConfig, check, noise_pair
 from apo_bench.scenario import Scenario, human_error_covariance, load_scenario, spread_error
-from apo_bench.scenario.layouts import Layouts, draw_layouts
+from apo_bench.scenario.layout import Layouts, draw_layouts
 
 _BY_PART = frozenset(
     (

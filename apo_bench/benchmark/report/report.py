@@ -43,7 +43,7 @@ from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
-PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "detected")
+PNG = ("success_over_noise_level", "success_over_tightness", "success_over_looks", "detected")
 """Figures that are also kept as PNG."""
 FILES = ("cells", "pairs", "half_levels", "detected", "gaps", "confusion", "felt", "times")
 """Tables that are also kept as files; those of `_IF_ANY` if there is any line."""

@@ -20,7 +20,8 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
-from apo_bench.formats.json_forms import PoseForm, observation_form
+from apo_bench.formats.json_forms import PoseForm
+from apo_bench.formats.observation_json import observation_form
 from apo_bench.geometry import Array, Face, RoundFace
 from apo_bench.io import Table, convert_typed, decoded, parse_plain
 

@@ -62,7 +62,8 @@ class TrackTable(Table, frozen=True, kw_only=True):
     title: Text
     overall: bool = True
     quick_trials: Annotated[int, Meta(ge=1)] = 1
-    arms: Text | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
+    # msgspec 0.22 frees the pattern of `Text` twice where it is one of several types, so one name is a plain `str`.
+    arms: str | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
 
 
 def seen_by(track: Track, estimator: str) -> Track:

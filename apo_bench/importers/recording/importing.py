@@ -20,7 +20,7 @@ from apo_bench.importers.recording.refusals import check_arrangement, check_move
 from apo_bench.importers.recording.rests import RestSpan, least_rest_s, rests_of
 from apo_bench.importers.recording.stays import Stay, all_stays
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.perception.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
+from apo_bench.perception.observation.models import UNSEEN_DEVIATION, floor_covariance, last_seen, with_shared
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -97,7 +97,7 @@ def import_recording(
         assembly=assembly,
         start=start,
         poses=last_seen(assembly, start, goals, seen),
-        covariance=floored(covariance + _adjustments(operations, assembly)),
+        covariance=floor_covariance(covariance + _adjustments(operations, assembly)),
         observed=seen,
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,

@@ -64,7 +64,7 @@ def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
     return replace(assembly, operations=operations)
 
 
-def evidence_of(
+def collect_evidence(
     assembly: Assembly, k: int, taken: Iterable[tuple[Contact, Facing, PairThresholds]], is_uncorrected: Poses
 ) -> list[Evidence]:
     """What speaks for the contacts of operation k, in the order of parts and faces.

@@ -23,7 +23,7 @@ from apo_bench.perception.detection.estimate import estimate
 from apo_bench.perception.detection.evidence import (
     DetectedContacts,
     Rival,
-    evidence_of,
+    collect_evidence,
     with_contacts,
     without_contacts,
 )
@@ -63,7 +63,7 @@ def detect_contacts_jointly(observation: Observation, rules: Rules = GENEROUS_RU
         ended: dict[tuple[frozenset[Contact], ...], _History] = {}
         for history in kept:
             for partial in _Search(seen, rules, k, others, history).endings():
-                longer = history.followed(partial)
+                longer = history.follow(partial)
                 if longer.badness < ended.get(longer.key, _History(badness=np.inf)).badness:
                     ended[longer.key] = longer
         ranked = sorted(ended.values(), key=lambda history: history.badness)
@@ -86,7 +86,7 @@ class _History:
         """What makes it another one."""
         return tuple(frozenset(c.contact for c in some) for some in self.taken)
 
-    def followed(self, partial: "_Partial") -> "_History":
+    def follow(self, partial: "_Partial") -> "_History":
         """With one operation more."""
         return _History((*self.taken, partial.taken), partial.at.estimate.goals, partial.surprise, partial.badness)
 
@@ -212,7 +212,7 @@ def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
         [
             each
             for k, (taken, poses) in enumerate(zip(history.taken, is_uncorrected, strict=True))
-            for each in evidence_of(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
+            for each in collect_evidence(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
         ]
         for history in kept[:2]
     ]

@@ -60,12 +60,9 @@ class Reobservations:
             chosen and all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen),
             f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}.",
         )
-        look = observe(self._demonstration, self._later(), self._rng)
+        again = getattr(self._noise, "again", None)
+        noise = self._noise if again is None or self._first is None else partial(again, first=deepcopy(self._first))
+        look = observe(self._demonstration, noise, self._rng)
         self.left -= 1
         self.reobservations += len(chosen)
         return replace(look, assembly=self._assembly, observed=look.observed & np.isin(np.arange(n), [*chosen]))
-
-    def _later(self) -> Noise:
-        """The noise of a look after the first."""
-        again = getattr(self._noise, "again", None)
-        return self._noise if again is None or self._first is None else partial(again, first=deepcopy(self._first))

@@ -221,7 +221,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
     assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
-    (figure,) = [path for path in made.figures if path.name == "success_over_level.png"]
+    (figure,) = [path for path in made.figures if path.name == "success_over_noise_level.png"]
     assert figure.read_bytes().startswith(b"\x89PNG")
     page = pages.lines(made.page)
     assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
@@ -283,7 +283,7 @@ def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
     assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
     methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
     report(write(tmp_path / "run", [row(method) for method in dict.fromkeys(methods)]))
-    drawn = (tmp_path / "run" / "figures" / "success_over_level.svg").read_text(encoding="utf-8")
+    drawn = (tmp_path / "run" / "figures" / "success_over_noise_level.svg").read_text(encoding="utf-8")
     assert all(f">{method}</text>" in drawn for method in methods)
 
 

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario
+from apo_bench import Assembly, InputError, Observation, correct, detect_contacts, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
-from apo_bench.perception.observation.models.displaced import floored
+from apo_bench.perception.observation.models.displacement import floor_covariance
 from apo_bench.scenario.file import scenario_names
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
 from tests import scenes
@@ -40,7 +40,7 @@ def stated(seen: Observation, noise_level: float, play_m: float = 0.0) -> Observ
     covariance = np.tile(
         np.diag(np.repeat([noise_level * 1e-3, np.radians(noise_level)], 3) ** 2), (len(seen.poses), 1, 1)
     )
-    return replace(seen, covariance=floored(covariance), play_m=play_m)
+    return replace(seen, covariance=floor_covariance(covariance), play_m=play_m)
 
 
 def without_contacts(assembly: Assembly) -> Assembly:
@@ -173,7 +173,9 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
 @pytest.mark.parametrize("wrong", [(None,), ("seen", "fixed")])
 def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
     given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
-    with pytest.raises(InputError, match=r"(observation|rules) of recognise must be an? (Observation|Rules), got"):
+    with pytest.raises(
+        InputError, match=r"(observation|rules) of detect_contacts must be an? (Observation|Rules), got"
+    ):
         detect_contacts(*given)
 
 
@@ -298,7 +300,7 @@ def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
     after = belief
     for J in rows:
-        after = after.conditioned(np.zeros(3), J, noise)
+        after = after.condition(np.zeros(3), J, noise)
     J = np.concatenate(rows)
     R = np.kron(np.eye(2), noise)
     P = belief.covariance

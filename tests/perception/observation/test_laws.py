@@ -18,7 +18,7 @@ from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import sighted
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.isotropic import Isotropic
 from apo_bench.perception.observation.noise import FAILURES, NOISES, Noise, NoiseLevel, make_noise
 from apo_bench.trial import run

@@ -1,7 +1,7 @@
 """Noise models, one a file: what a camera makes of the true poses."""
 
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import floored, with_shared
+from apo_bench.perception.observation.models.displacement import floor_covariance, with_shared
 from apo_bench.perception.observation.models.empirical import Empirical, empirical_noise
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.failures import CameraFailures
@@ -45,7 +45,7 @@ __all__ = (
     "Symmetric",
     "Tail",
     "empirical_noise",
-    "floored",
+    "floor_covariance",
     "last_seen",
     "log_density_across",
     "log_density_along",

@@ -13,7 +13,7 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, Tails, meas
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import displaced, floored, observe_displaced
+from apo_bench.perception.observation.models.displacement import displace, floor_covariance, observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.perception.observation.models.tails import Split
@@ -110,7 +110,7 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
 
     Operations that were not observed keep their covariance.
     """
-    stated = floored(camera.covariance(observation.poses, Fitted(measured, _AS_MEASURED, camera).covariance))
+    stated = floor_covariance(camera.covariance(observation.poses, Fitted(measured, _AS_MEASURED, camera).covariance))
     stated = np.where(observation.observed[:, None, None], stated, observation.covariance)
     tails = stated_tails(measured, _AS_MEASURED, camera, observation.poses)
     return replace(observation, covariance=stated, shared=(), tails=tails)
@@ -166,7 +166,7 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)
     xi = camera.twists(demonstration.poses, errors * scale)
-    stated = camera.covariance(displaced(demonstration.poses, xi), covariance * np.outer(scale, scale))
+    stated = camera.covariance(displace(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(noise_level) > 0.0)
     goals = seen.poses.copy()

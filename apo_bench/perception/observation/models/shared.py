@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import observe_displaced, observe_shared
+from apo_bench.perception.observation.models.displacement import observe_displaced, observe_shared
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OWN = 1.0 / 20.0

@@ -18,7 +18,7 @@ from apo_bench.geometry import (
     rings_of,
     straighten,
 )
-from apo_bench.scenario.parts.making.moments import Moments, summed
+from apo_bench.scenario.parts.making.moments import Moments, sum_moments
 
 _SAME_M = 1e-9
 _PARALLEL = 1e-12
@@ -93,7 +93,7 @@ def join(*bodies: Body) -> Body:
         tuple(piece for body in bodies for piece in body.pieces),
         tuple(_joined_flats(flats)),
         tuple(_joined_rounds(rounds)),
-        summed(bodies[0].moments, (body.moments for body in bodies[1:])),
+        sum_moments(bodies[0].moments, (body.moments for body in bodies[1:])),
     )
 
 
