@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import html.parser
 import json
-import random
 from pathlib import Path
 
 import pytest
 from markdown_it import MarkdownIt
 from msgspec import to_builtins
 
-from apo_bench import InputError
-from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, read_entry, score_of, write_entry
+from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, score_of, write_entry
 from apo_bench.benchmark.scoring.leaderboard import read_entries
 from apo_bench.benchmark.scoring.track import read_track
 from apo_bench.cli.app import main
