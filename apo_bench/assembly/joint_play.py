@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import contact_kind, play_mm
+from apo_bench.assembly.contact_kinds import contact_kind, play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose

@@ -39,24 +39,14 @@ class OutlierModel:
     """Where the camera stands, world frame, [m]: what is too near or far is so on its ray. None: in any direction."""
 
     def __post_init__(self) -> None:
-        named = (self.flip, self.stale, self.swap, self.shift)
-        rates = (self.gross, self.broad, 1.0 - self.gross - self.broad, self.relation, self.view, *named)
-        require(
-            all(0.0 < rate < 1.0 for rate in rates),
-            f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations, "
-            f"{self.flip!r} turned, {self.stale!r} stale, {self.swap!r} exchanged, {self.shift!r} shifted, "
-            f"{self.view!r} displaced together were given; all must be above 0, gross and broad together and each "
-            "other one below 1.",
-        )
-        require(sum(named) < 1.0, f"shares of {sum(named):g} of gross observations have a name; give less than 1.")
-        require(
-            0.0 <= self.repeat < 1.0,
-            f"repeat={self.repeat!r} was given; a later look repeats with 0 to less than 1.",
-        )
-        require(
-            1.0 < self.times < np.inf,
-            f"times={self.times!r} was given; a broad observation needs a finite number above 1.",
-        )
+        named = self.flip + self.stale + self.swap + self.shift
+        for name in ("gross", "broad", "relation", "flip", "stale", "swap", "shift", "view"):
+            rate = getattr(self, name)
+            require(0.0 < rate < 1.0, f"{name}={rate!r} was given; give a rate above 0 and below 1.")
+        require(self.gross + self.broad < 1.0, "gross and broad add up to 1 or more; give rates whose sum is below 1.")
+        require(named < 1.0, f"flip, stale, swap and shift add up to {named:g}; give shares whose sum is below 1.")
+        require(0.0 <= self.repeat < 1.0, f"repeat={self.repeat!r} was given; give a rate of 0 or more and below 1.")
+        require(1.0 < self.times < np.inf, f"times={self.times!r} was given; give a finite number above 1.")
 
     @property
     def surprises(self) -> tuple[float, float, float]:

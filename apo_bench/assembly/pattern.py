@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.facing_round import OPPOSING, contact_kind
+from apo_bench.assembly.contact_kinds import OPPOSING, contact_kind
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.projection import project_round_faces
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, invert, simplify

@@ -21,11 +21,6 @@ class Step(NamedTuple):
     undo: bool = False
 
 
-def once_each(n: int) -> tuple[Step, ...]:
-    """The plain schedule: every operation once, in order."""
-    return tuple(Step(k) for k in range(n))
-
-
 @final
 @check_arguments
 @copyable
@@ -48,7 +43,7 @@ class Plan:
         freeze(self, target_poses=(n, 4, 4), start=(4, 4))
         check_parts(self.assembly, self.start)
         if not self.schedule:
-            object.__setattr__(self, "schedule", once_each(n))
+            object.__setattr__(self, "schedule", tuple(map(Step, range(n))))
         if not len(self.step_poses):
             object.__setattr__(self, "step_poses", self.target_poses[[step.operation for step in self.schedule]])
         freeze(self, step_poses=(len(self.schedule), 4, 4))

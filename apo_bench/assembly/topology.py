@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly.facing_round import WALLS, contact_kind, geometric_play
+from apo_bench.assembly.contact_kinds import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
 

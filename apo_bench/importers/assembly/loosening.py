@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.errors import InputError
 from apo_bench.geometry import Solid, intrusion, physical_pieces
 from apo_bench.importers.assembly.posed import PosedPart
