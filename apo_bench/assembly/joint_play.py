@@ -23,7 +23,7 @@ _LEVER_MM = 30.0
 _DIGITS = 6
 """Of a play in mm; what a program leaves behind them is rounding."""
 _ROUND_M = 9
-"""Digits of a pose [m] that tell two layouts apart."""
+"""Digits of a pose [m] that distinguish two layouts apart."""
 
 AnyFace = Face | RoundFace
 

@@ -17,9 +17,9 @@ class OutlierModel:
     """Rates and breadths: stated by noise that knows them, assumed otherwise."""
 
     gross: float = 0.1
-    """Part of the operations of which what was seen says nothing."""
+    """Part of the operations of which what was observed says nothing."""
     broad: float = 0.03
-    """Part that is seen with `times` the stated deviation."""
+    """Part that is observed with `times` the stated deviation."""
     times: float = 10.0
     relation: float = 0.001
     """Part of the relations that are wrong."""
@@ -28,7 +28,7 @@ class OutlierModel:
     stale: float = 0.15
     """Part of the gross ones that are where the part was before."""
     swap: float = 0.1
-    """Part of the gross ones that are where another part is, which is seen here in turn."""
+    """Part of the gross ones that are where another part is, which is observed here in turn."""
     shift: float = 0.2
     """Part of the gross ones that are turned rightly and too near or too far; what is left over has no name."""
     view: float = 0.02
@@ -50,13 +50,13 @@ class OutlierModel:
 
     @property
     def surprises(self) -> tuple[float, float, float]:
-        """-2 log of the probability of an inlier, a broad and a gross observation, beside that of an inlier."""
+        """-2 log of the probability of an inlier, a broad and a gross observation, relative to that of an inlier."""
         inlier = 1.0 - self.gross - self.broad
         return 0.0, -2.0 * float(np.log(self.broad / inlier)), -2.0 * float(np.log(self.gross / inlier))
 
     @property
     def relation_surprise(self) -> float:
-        """The same of a wrong relation, beside a right one."""
+        """The same of a wrong relation, relative to a right one."""
         return -2.0 * float(np.log(self.relation / (1.0 - self.relation)))
 
 

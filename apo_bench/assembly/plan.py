@@ -81,14 +81,14 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
 
 
 def poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
-    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
-    goals = np.array(plan.target_poses)
+    """How many operations are done, and the poses in force, before each time something is undone and at the end."""
+    poses = np.array(plan.target_poses)
     done = 0
     stages = []
     for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
         if not step.undo:
-            goals[step.operation] = target
+            poses[step.operation] = target
             done = step.operation + 1
         if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
-            stages.append((done, np.array(goals)))
+            stages.append((done, np.array(poses)))
     return stages

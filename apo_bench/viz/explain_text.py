@@ -22,7 +22,7 @@ _OFF_M = 1e-6  # a turn is said to be about a point only if that is farther from
 def total(explanation: Explanation) -> str:
     """`the contacts fix 13 of 18 directions; 5 are free and 14 equations redundant`."""
     redundant = f"{explanation.redundant} of {explanation.rank + explanation.redundant} equations redundant"
-    fixed = f"{explanation.rank} of {6 * len(explanation.goals)} directions"
+    fixed = f"{explanation.rank} of {6 * len(explanation.poses)} directions"
     return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
@@ -144,7 +144,7 @@ def _operation_form(explanation: Explanation, o: OperationExplanation) -> dict[s
         "part": o.part,
         "rank": o.rank,
         "fixed": list(o.fixed),
-        "free": list(_free_forms(o.free, explanation.goals[o.operation])),
+        "free": list(_free_forms(o.free, explanation.poses[o.operation])),
         "through": [_hold_form(hold) for hold in o.through],
         "agreeing": [_hold_form(hold) for hold in o.agreeing],
         "covariance_mm_deg": covariance_form(o.covariance),
