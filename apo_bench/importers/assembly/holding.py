@@ -17,7 +17,6 @@ from apo_bench.scenario.scenario import Grasp, Site
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import RestingPart, Stroke, arrival_line, first_clear, hover, obstacles, tip_frame
-from apo_bench.simulation.robot import ArmAlone
 
 _ARM = "six_axis"
 _OVER_M = (0.0, 0.005, 0.0085)
@@ -62,7 +61,7 @@ def found_holds(
         nests: Part -> what it waits in.
     """
     arm = find_arm(_ARM)
-    hand = ArmAlone(arm, Kinematics(arm))
+    kinematics = Kinematics(arm)
     best: dict[str, Grasp | None] = {}
     crowded = set[str]()
     now = {part: np.array(poses[part]) for part in (TABLE, *base)}
@@ -76,7 +75,7 @@ def found_holds(
         goal = _resting(solids, main, now, placing.moves)
         lift = Stroke(taken.T, -UP, _LIFT_M, taken.around)
         way = _Way((taken, goal), (lift, _stroke(solids, placing, now, goal)))
-        best[main] = _best(hand, solids[main], way, site)
+        best[main] = _best(kinematics, solids[main], way, site)
         if best[main] is None and (offered := holds(solids[main], _up(goal.T), arm.opening_m)):
             best[main] = _grasp(offered[0])
             crowded.add(main)
@@ -94,11 +93,11 @@ def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: Res
     return Stroke(goal.T, line.way, line.travel, goal.around)
 
 
-def _best(hand: ArmAlone, solid: Solid, way: _Way, site: Site) -> Grasp | None:
+def _best(kinematics: Kinematics, solid: Solid, way: _Way, site: Site) -> Grasp | None:
     """The first place that is free and in reach; what comes level may be held by two, which the robot then finds."""
-    for grasps in _offered(solid, way.places[0].T, hand.arm.opening_m):
-        free = first_clear(hand, solid, grasps, way.places, way.strokes)
-        if free is not None and (free.ahead is None or _reached(hand, free, way, site)):
+    for grasps in _offered(solid, way.places[0].T, kinematics.arm.opening_m):
+        free = first_clear(kinematics, solid, grasps, way.places, way.strokes)
+        if free is not None and (free.ahead is None or _reached(kinematics, free, way, site)):
             return free
     return None
 
@@ -133,12 +132,12 @@ def _grasp(hold: PadPlace, ahead: Array | None = None) -> Grasp:
     return Grasp(hold.point, hold.across, hold.half_width, ahead)
 
 
-def _reached(hand: ArmAlone, grasp: Grasp, way: _Way, site: Site) -> bool:
+def _reached(kinematics: Kinematics, grasp: Grasp, way: _Way, site: Site) -> bool:
     """Whether the arm reaches a tilted grasp where the part waits, and where the site may put it."""
     start, goal = (place.T @ tip_frame(grasp, place.T) for place in way.places)
     sites = [pose.at((*site.center_m, 0.0), (0.0, 0.0, np.degrees(yaw))) for yaw in (*site.yaw_rad, 0.0)]
     tips = [tip for at in (start, *(T @ goal for T in sites)) for tip in (at, hover(at))]
-    home = np.array(hand.arm.home)
+    home = np.array(kinematics.arm.home)
     return any(
-        all(hand.kinematics.inverse(tip @ turn, home) is not None for tip in tips) for turn in (np.eye(4), _HALF_TURN)
+        all(kinematics.inverse(tip @ turn, home) is not None for tip in tips) for turn in (np.eye(4), _HALF_TURN)
     )
