@@ -34,9 +34,8 @@ def recording_import(
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
     from apo_bench.importers.recording.camera_file import read_camera
     from apo_bench.importers.recording.formats import read_log
-    from apo_bench.importers.recording.hands import find_hands
     from apo_bench.importers.recording.objects_file import name_tracks, read_objects
-    from apo_bench.importers.recording.show.text import reading_lines
+    from apo_bench.importers.recording.text import reading_lines
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
     check_outputs(outputs, (log, camera, objects))
@@ -47,11 +46,10 @@ def recording_import(
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
-    hands = find_hands(read, named)
-    tracks = name_tracks(read, named, hands)
-    print_lines(reading_lines(read, named, hands))
+    tracks = name_tracks(read, named)
+    print_lines(reading_lines(read, named))
     if scenario is None:
-        _import_unplanned(read, named, stated, tracks, out, picture)
+        _import_unplanned(read, stated, tracks, out, picture)
     else:
         _import(read, named, stated, tracks, scenario, (ends, unseen), (out, picture, paths))
 
@@ -59,9 +57,9 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
+    from apo_bench.importers.recording.drawing import draw_recording
     from apo_bench.importers.recording.importing import import_recording
-    from apo_bench.importers.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
-    from apo_bench.importers.recording.show.text import PATH_HEAD, imported_lines, path_rows
+    from apo_bench.importers.recording.text import PATH_HEAD, imported_lines, path_rows
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
@@ -70,7 +68,7 @@ def _import(
         imported = import_recording(tracks, camera, loaded, stated, log.file, objects.models)
     except InputError:
         if picture is not None:
-            draw_recording(unfit_drawing(log, tracks, camera, loaded), picture)
+            draw_recording(f"{log.file}, {loaded.name}; it does not fit", tracks, camera.T_world_camera, [], picture)
             typer.echo(f"Wrote {picture}, as it was read")
         raise
     mains = [operation.main for operation in loaded.assembly.operations]
@@ -84,25 +82,24 @@ def _import(
         _write_table(out, mains, rests, imported.observation.poses, camera)
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
-    if picture is not None:
-        draw_recording(drawing_of(imported, log, tracks, camera), picture)
-    _print_rests(imported.camera, mains, rests, tracks, [""])
+    found = imported.arrangement.camera
+    _show(f"{log.file}, {loaded.name}", tracks, found, mains, rests, picture)
     print_lines(imported_lines(imported))
     _print_written(out, paths, picture)
 
 
-def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.importers.recording.show.drawing import draw_recording, unplanned_drawing
-    from apo_bench.importers.recording.show.text import put_lines
-    from apo_bench.importers.recording.unplanned import goals_of, unplanned_recording
+def _import_unplanned(log: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
+    from apo_bench.importers.recording.unplanned import unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
-    parts = [put.part for put in recording.puts]
-    rests = [put.rest for put in recording.puts]
-    _write_table(out, parts, rests, goals_of(recording), camera)
-    if picture is not None:
-        draw_recording(unplanned_drawing(recording, log, tracks), picture)
-    _print_rests(recording.camera, parts, rests, tracks, put_lines(recording))
+    parts = [placement.part for placement in recording.placements]
+    rests = [placement.rest for placement in recording.placements]
+    poses = [recording.camera.T_world_camera @ rest.T for rest in rests]
+    _write_table(out, parts, rests, poses, camera)
+    _show(log.file, tracks, recording.camera, parts, rests, picture)
+    for k, placement in enumerate(recording.placements, start=1):
+        if placement.carries:
+            typer.echo(f"operation {k}: {placement.part} and {', '.join(placement.carries)} moved together")
     _print_written(out, picture)
 
 
@@ -118,24 +115,25 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
     return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
 
 
-def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, further: list[str]) -> None:
-    """The camera, where each part rested after its operation, and further lines."""
-    from apo_bench.importers.recording.show.text import camera_lines, rest_lines
+def _show(title: str, tracks: Any, camera: Any, parts: list[str], rests: list[Any], picture: Path | None) -> None:
+    """Print the camera and where each part rested after its operation, and draw them."""
+    from apo_bench.importers.recording.drawing import draw_recording
+    from apo_bench.importers.recording.text import camera_lines, rest_lines
 
+    pairs = list(zip(parts, rests, strict=True))
     print_lines(camera_lines(camera))
-    times = {part: track.t for part, track in tracks.items()}
-    lines = rest_lines(list(zip(parts, rests, strict=True)), camera.T_world_camera, times)
-    typer.echo("\n" + "\n".join([*lines, *further]))
+    typer.echo("\n" + "\n".join(rest_lines(pairs, camera.T_world_camera)) + "\n")
+    if picture is not None:
+        ended = [(part, rest.begins) for part, rest in pairs if rest is not None]
+        draw_recording(title, tracks, camera.T_world_camera, ended, picture)
 
 
 def _print_written(*paths: Path | None) -> None:
     typer.echo("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None))
 
 
-def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
-    """Write goals as CSV; an operation that the log does not show has no rest."""
-    from apo_bench.importers.recording.importing import deviations
-    from apo_bench.importers.recording.show.text import OBSERVATION_HEAD, observation_rows
+def _write_table(path: Path, parts: list[str], rests: list[Any], poses: Any, camera: Any) -> None:
+    """Write observed poses as CSV; an operation that the log does not show has no rest."""
+    from apo_bench.importers.recording.text import OBSERVATION_HEAD, observation_rows
 
-    sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, goals, sizes, [rest is not None for rest in rests]))
+    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, poses, rests, camera))
