@@ -23,7 +23,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES
 
 if TYPE_CHECKING:
-    from apo_bench.importers.cad.importing import Imported
+    from apo_bench.importers.cad.importing import ImportedPart
     from apo_bench.importers.cad.solids.raw_solid import RawSolid
 
 part = group("part", "Parts from CAD files.")
@@ -50,7 +50,7 @@ def part_import(
     from apo_bench.importers.cad.importing import raw_solids
     from apo_bench.importers.cad.part_report import file_lines, report_file
     from apo_bench.importers.cad.places import named_places, write_places
-    from apo_bench.importers.cad.solids.naming import renamed
+    from apo_bench.importers.cad.solids.naming import rename_faces
 
     names = _pairs(name or [])
     require(1.0 <= density <= 25_000.0, f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
@@ -62,7 +62,7 @@ def part_import(
         not names or len(raws) <= 1,
         f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own.",
     )
-    raws = [renamed(raw, names) for raw in raws]
+    raws = [rename_faces(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("\n".join(file_lines(source, file)), as_json)
@@ -79,18 +79,18 @@ def part_import(
 
 def _written(
     file: Path, raws: Sequence[RawSolid], out: Path, density: float, as_json: bool
-) -> tuple[list[Imported], list[str]]:
+) -> tuple[list[ImportedPart], list[str]]:
     """Parts with their pictures; and why others of the file became none."""
     from apo_bench.importers.cad.importing import import_part
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import part_lines, report_part
-    from apo_bench.importers.cad.solids.naming import part_name, title_of
+    from apo_bench.importers.cad.solids.naming import part_name, clean_title
 
-    imported: list[Imported] = []
+    imported: list[ImportedPart] = []
     left_out: list[str] = []
     used: set[str] = set()
     for raw in raws:
-        called = part_name(raw.name, used | _of_others(out, title_of(raw.name)))
+        called = part_name(raw.name, used | _of_others(out, clean_title(raw.name)))
         used.add(called)
         picture = out / f"{called}.png"
         for path in (picture, *(out / f"{called}{ending}" for ending in (".xml", ".toml"))):

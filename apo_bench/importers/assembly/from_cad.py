@@ -13,8 +13,10 @@ from apo_bench.importers.cad.assembled import coming_near, mates_of
 from apo_bench.importers.cad.importing import import_part, raw_solids
 from apo_bench.importers.cad.meshes.mesh_file import CadFile
 from apo_bench.importers.cad.places import named_places, write_places
-from apo_bench.importers.cad.solids.naming import part_name, title_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.naming import clean_title, part_name
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.importers.cad.solids.region import Region
 
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005
@@ -47,7 +49,7 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
     of_files: list[str] = []
     for file in files:
         source, solids = _solids_of(file, unit)
-        of_files += (f"{file.name}: {each}" for each in source.said)
+        of_files += (f"{file.name}: {each}" for each in source.warnings)
         found += [(file.name, raw) for raw in solids]
     if sum(len(raw.places) for _, raw in found) < 2:
         raise InputError(
@@ -104,7 +106,7 @@ def import_solid(
     name = part_name(raw.name, used)
     foot = _foot(raw)
     mates = None if mates is None else mates.translate(-foot)
-    called = title_of(raw.name)
+    called = clean_title(raw.name)
     part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {called}", others=others - foot, mates=mates)
     title = f" ({called})" if raw.name != name else ""
     said = [f"{name}{title}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from shapely import MultiPoint, Point
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
@@ -45,8 +46,6 @@ class Stance(NamedTuple):
 
 def stance(solid: Solid, R: Array) -> Stance:
     """How a solid stands that is turned like this, (3, 3)."""
-    from shapely import MultiPoint, Point
-
     up = R[2]
     low = extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
@@ -63,8 +62,6 @@ def stance(solid: Solid, R: Array) -> Stance:
 
 def is_carried(base: Array, middle: Array, height_m: float) -> bool:
     """Whether a centre of mass is above the area that carries, (k, 2), with a margin that grows with its height."""
-    from shapely import MultiPoint, Point
-
     carrier = MultiPoint(base).convex_hull
     at = Point(middle[:2])
     is_above = carrier.geom_type == "Polygon" and carrier.contains(at)

@@ -3,11 +3,13 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import manifold3d
 import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.cad.solids.bodies import body_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
 
 _STEP_MM = 1.0
 """Points of others are so far apart, and so are the places on their way."""
@@ -58,8 +60,6 @@ def surface_points(mesh: Mesh, step: float) -> Array:
 
 def mates_of(raws: Sequence[RawSolid]) -> list[Any]:
     """Of each solid all others at their places around one of its own, in its frame, as one body of manifold3d."""
-    import manifold3d
-
     bodies = [body_of(raw.mesh) for raw in raws]
     others = []
     for own in raws:

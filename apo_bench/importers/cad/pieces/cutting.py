@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import manifold3d
 import numpy as np
+from scipy.spatial import ConvexHull, cKDTree
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
@@ -13,7 +15,8 @@ from apo_bench.importers.cad.pieces.keeping_out import keeping_out
 from apo_bench.importers.cad.pieces.refining import Beside
 from apo_bench.importers.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
 from apo_bench.importers.cad.solids.bodies import body_of
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, Region
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids.region import Region
 from apo_bench.scenario.parts.allowed import MOST_PIECES
 from apo_bench.scenario.parts.checking import touching_groups
 
@@ -57,9 +60,6 @@ def cut(raw: RawSolid, others: Array | None = None, mates: Any = None) -> Cut:
 
 def _cut(raw: RawSolid, others: Array | None, mates: Any, trims: bool) -> tuple[Cut, bool]:
     """The pieces, and whether all of them hang together."""
-    import manifold3d
-    from scipy.spatial import ConvexHull, cKDTree
-
     size = raw.mesh.extent
     body = body_of(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
@@ -112,8 +112,6 @@ def _cut(raw: RawSolid, others: Array | None, mates: Any, trims: bool) -> tuple[
 def _without_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], list[float], bool]:
     """Without what hangs on nothing once free shapes are trimmed, if it is no more than that; how much that is; and
     whether nothing else hangs on nothing."""
-    from scipy.spatial import ConvexHull
-
     groups = sorted(touching_groups(pieces), key=len)
     lost = [(group, sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group)) for group in groups[:-1]]
     crumbs = [(group, volume) for group, volume in lost if volume < most]

@@ -7,6 +7,7 @@ cut: beyond one of them there is nothing of it.
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+import manifold3d
 import numpy as np
 
 from apo_bench.geometry import Array
@@ -84,8 +85,6 @@ def _trimmed(part: CutPart, solid: Any, mates: Any, hair: float) -> CutPart:
 
 def _beside(body: Any, hull: Any) -> Any:
     """What of a body lies in the box around a hull."""
-    import manifold3d
-
     low, high = np.reshape(hull.bounding_box(), (2, 3))
     return body ^ manifold3d.Manifold.cube(high - low).translate(low)
 
