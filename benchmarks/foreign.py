@@ -34,9 +34,9 @@ from apo_bench.geometry import pose
 from apo_bench.importers.assembly.checking import check_file
 from apo_bench.importers.assembly.from_cad import import_solid, solids_at
 from apo_bench.importers.assembly.posed import read_posed
-from apo_bench.importers.assembly.upright import drafted
+from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.importers.cad.assembled import coming_near, mates_of
+from apo_bench.importers.cad.assembled import coming_near
 from apo_bench.importers.cad.places import named_places, write_places
 from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.records import TrialConfig
@@ -130,9 +130,9 @@ def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[d
             found += [(k, raw) for raw in solids_at(paths[k], file.unit, places)]
     raws = [raw for _, raw in found]
     made: dict[str, list[SolidPlace]] = {}
-    for (k, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
+    for (k, raw), others in zip(found, coming_near(raws), strict=True):
         with _said_of(lines[k], paths[k]):
-            part = import_solid(raw, others, folder, paths[k].name, made, mates)
+            part = import_solid(raw, others, folder, paths[k].name, made)
             made[part.name] = part.places
             solid = load_part(folder / f"{part.name}.xml", checked=False)  # as it has just been
             for key, more in (("solids", 1), ("flat", len(solid.faces)), ("round", len(solid.rounds))):
@@ -165,7 +165,7 @@ def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[di
     begin = time.process_time()
     path = folder / f"{each.name}.toml"
     try:
-        made = drafted(read_posed(poses))
+        made = new_upright_scenario(read_posed(poses))
         write_scenario(made, path, each.name, each.repository)
         scenario = load_scenario(path)
     except (InputError, RuntimeError) as error:

@@ -75,7 +75,7 @@ def scenario_new(
     ] = None,
     clearance: Annotated[
         float | None,
-        typer.Option(help="Room per side of faces that fit, mm. Default: as parts were drawn, or 0.25."),
+        typer.Option(help="Room per side of faces that fit, mm. Default: 0.25."),
     ] = None,
     loosen: Annotated[
         float,
@@ -86,8 +86,8 @@ def scenario_new(
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
     from apo_bench.importers.assembly.from_cad import import_assembly
     from apo_bench.importers.assembly.posed import UPS, read_posed
-    from apo_bench.importers.assembly.upright import drafted
-    from apo_bench.importers.assembly.writing import draft_lines, write_scenario
+    from apo_bench.importers.assembly.upright import USUAL_MM, new_upright_scenario
+    from apo_bench.importers.assembly.writing import choice_lines, write_scenario
 
     check_writable(out, "--out", (".toml",))
     require(
@@ -107,9 +107,10 @@ def scenario_new(
     elif poses is None:
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
     asked = [each.strip() for each in order.split(",")] if order else []
-    made = drafted(read_posed(poses, named), up, fixed or (), clearance, loosen, asked)
+    room = USUAL_MM if clearance is None else clearance
+    made = new_upright_scenario(read_posed(poses, named), up, fixed or (), room, loosen, asked)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
-    typer.echo("\n".join(draft_lines(made)))
+    typer.echo("\n".join(choice_lines(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {shlex.quote(str(out))}")
 

@@ -77,14 +77,12 @@ def import_part(
     source: str,
     density: float = 1000.0,
     others: Array | None = None,
-    mates: Any = None,
 ) -> ImportedPart:
     """Write a raw solid as `NAME.xml` and `NAME.toml`, which make a part.
 
     Args:
         density: [kg/m^3].
         others: Points of other solids that come near to it, (k, 3), [mm]: there its pieces are finest; None: unknown.
-        mates: All others at their places, as one body of manifold3d, [mm]: its pieces keep out of these.
 
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
@@ -98,7 +96,7 @@ def import_part(
     flats, rounds, refused = contact_faces(raw)
     _check_faces(source, len(flats) + len(rounds))
     try:
-        pieces = cut(raw, others, mates)
+        pieces = cut(raw, others)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     refused |= dict.fromkeys(pieces.filled, _FILLED)

@@ -41,7 +41,6 @@ def report_part(part: ImportedPart) -> dict[str, Any]:
         "volume_mm3": {"before": raw.mesh.volume, "after": 1e9 * part.solid.volume},
         "pieces": len(part.solid.pieces),
         "pieces_for_free_shapes": part.cut.hulls,
-        "grown_mm3": part.cut.grown,
     }
 
 
