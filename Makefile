@@ -2,11 +2,11 @@
 #   make sweep   set up, run a small benchmark (4 minutes on two cores), print the table, write the report
 #   make test    set up, check style and types, build the documentation, run every test
 # and one the headline of the project (40 trials per cell take some two hours on two cores):
-#   make headline [TRIALS=40] [FIDELITY=contact]
+#   make headline [TRIALS=40] [FIDELITY=near-contact]
 
 PYTHON ?= python3
 WORKERS ?= 2
-FIDELITY ?= contact
+FIDELITY ?= near-contact
 sweep: TRIALS ?= 10
 sweep: OUT ?= runs/sweep
 headline: TRIALS ?= 40

@@ -19,10 +19,10 @@ import gymnasium
 
 __version__ = "0.1.0"
 
-gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
+gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay", max_episode_steps=1)
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
-gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert")
-gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble")
+gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert", max_episode_steps=200)
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble", max_episode_steps=10_000)
 
 _EXPORTS = MappingProxyType(
     {
@@ -32,12 +32,14 @@ _EXPORTS = MappingProxyType(
         "Corrected": "apo_bench.envs.corrected",
         "Correction": "apo_bench.assembly.correction_record",
         "Criteria": "apo_bench.records.thresholds",
-        "Demonstration": "apo_bench.assembly.goals",
+        "Demonstration": "apo_bench.assembly.demonstration",
+        "Flatten": "apo_bench.envs.flatten",
         "Film": "apo_bench.simulation.scene.render",
         "InputError": "apo_bench.errors",
-        "Layout": "apo_bench.assembly.goals",
-        "Observation": "apo_bench.assembly.goals",
-        "Plan": "apo_bench.assembly.goals",
+        "Layout": "apo_bench.assembly.demonstration",
+        "Observation": "apo_bench.assembly.observation",
+        "Plan": "apo_bench.assembly.plan",
+        "RateTable": "apo_bench.benchmark.rate_table",
         "ReplayResult": "apo_bench.assembly.reached",
         "Scenario": "apo_bench.scenario.scenario",
         "Scene": "apo_bench.simulation.scene.scene",
@@ -47,8 +49,10 @@ _EXPORTS = MappingProxyType(
         "build_scene": "apo_bench.simulation.scene.scene",
         "camera_view": "apo_bench.simulation.scene.render",
         "correct": "apo_bench.correction.correctors",
-        "correct_many": "apo_bench.correction.correctors",
+        "correct_many": "apo_bench.correction.batches",
         "demonstrate": "apo_bench.simulation.human.demonstration",
+        "detect_contacts": "apo_bench.perception.detection.contacts",
+        "evaluate": "apo_bench.benchmark.evaluation",
         "draw_layout": "apo_bench.scenario.layout",
         "explain": "apo_bench.correction.explanation",
         "fitting_plan": "apo_bench.trial.fitting",
@@ -58,10 +62,9 @@ _EXPORTS = MappingProxyType(
         "picture": "apo_bench.simulation.scene.render",
         "read_arm": "apo_bench.simulation.arms.building",
         "read_observation": "apo_bench.formats.observation",
-        "recognise": "apo_bench.perception.detection.contacts",
         "replay": "apo_bench.simulation.execution.controller",
         "run_sweep": "apo_bench.benchmark.sweeps.sweep",
-        "run_trial": "apo_bench.trial.trial",
+        "run_trial": "apo_bench.trial.run",
     }
 )
 """Name -> the module that it is imported from when it is first asked for."""

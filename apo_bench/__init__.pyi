@@ -1,24 +1,27 @@
 """Static types of what `apo_bench` exports; `__init__.py` imports each name when it is first asked for."""
 
 from apo_bench.assembly.correction_record import Correction as Correction
-from apo_bench.assembly.goals import Demonstration as Demonstration
-from apo_bench.assembly.goals import Layout as Layout
-from apo_bench.assembly.goals import Observation as Observation
-from apo_bench.assembly.goals import Plan as Plan
+from apo_bench.assembly.demonstration import Demonstration as Demonstration
+from apo_bench.assembly.demonstration import Layout as Layout
+from apo_bench.assembly.observation import Observation as Observation
+from apo_bench.assembly.plan import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.evaluation import evaluate as evaluate
+from apo_bench.benchmark.rate_table import RateTable as RateTable
 from apo_bench.benchmark.sweeps.grid import SweepConfig as SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
+from apo_bench.correction.batches import correct_many as correct_many
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
-from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
+from apo_bench.envs.flatten import Flatten as Flatten
 from apo_bench.errors import InputError as InputError
 from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.perception.detection.contacts import recognise as recognise
+from apo_bench.perception.detection.contacts import detect_contacts as detect_contacts
 from apo_bench.perception.observation.observing import observe as observe
 from apo_bench.records.settings import TrialConfig as TrialConfig
 from apo_bench.records.thresholds import Criteria as Criteria
@@ -35,6 +38,6 @@ from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
 from apo_bench.trial.fitting import fitting_plan as fitting_plan
-from apo_bench.trial.trial import run_trial as run_trial
+from apo_bench.trial.run import run_trial as run_trial
 
 __version__: str

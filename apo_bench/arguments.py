@@ -5,7 +5,7 @@ arrays, and a text where several names may stand is one name, never its letters.
 themselves.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import wraps
 from numbers import Integral, Real
 from types import NoneType, UnionType
@@ -19,10 +19,7 @@ Public = TypeVar("Public", bound=Callable[..., Any])
 
 
 class _Unfit(Exception):
-    """A value is not of a type."""
-
-    entry: Any = None
-    """The entry of the value that is not of its type, where the value has entries."""
+    """A value, or an entry of one, is not of a type; its argument is what is not."""
 
 
 class _Type(NamedTuple):
@@ -35,7 +32,7 @@ class _Type(NamedTuple):
 
 
 def check_arguments(public: Public) -> Public:
-    """Have a function, or the constructor of a class, check its arguments against its annotations.
+    """Make a function, or the constructor of a class, check its arguments against its annotations.
 
     Annotations are read at the first call. Python itself refuses an argument that is missing or unknown.
 
@@ -53,7 +50,7 @@ def check_arguments(public: Public) -> Public:
         try:
             return types[name].take(value)
         except _Unfit as unfit:
-            within = "" if unfit.entry is None or unfit.entry is value else f" with {shown(unfit.entry)} in it"
+            within = "" if unfit.args[0] is value else f" with {shown(unfit.args[0])} in it"
             wanted = f"{name} of {called} must be {types[name].words}"
             raise ArgumentError(f"{wanted}, got {shown(value)}{within}.") from None
 
@@ -71,7 +68,7 @@ def check_arguments(public: Public) -> Public:
 
 
 def _read(hint: Any) -> _Type:
-    """What an annotation stands for."""
+    """Return what an annotation stands for."""
     origin = get_origin(hint) or hint
     within = get_args(hint)
     if hint in _PLAIN:
@@ -81,12 +78,9 @@ def _read(hint: Any) -> _Type:
     if origin in (Union, UnionType):
         return _one_of([*map(_read, within)])
     if origin is Literal:
-        return _Type(
-            f"one of {', '.join(map(repr, within))}",
-            lambda value: _require(isinstance(value, str) and value in within, value),
-        )
+        return _that(f"one of {', '.join(map(repr, within))}", lambda x: isinstance(x, str) and x in within)
     if origin is Callable:
-        return _Type("a function", lambda value: _require(callable(value), value))
+        return _that("a function", callable)
     if origin is np.ndarray:
         return _array(is_truth=np.dtype[np.bool_] in within)
     if not isinstance(origin, type) or _is_unchecked_protocol(origin):
@@ -97,49 +91,57 @@ def _read(hint: Any) -> _Type:
         return _mapping(*map(_read, within))
     if issubclass(origin, Collection) and within:
         return _several(origin, within)
-    return _Type(add_article(origin.__name__), lambda value: _require(isinstance(value, origin), value))
+    return _that(add_article(origin.__name__), lambda x: isinstance(x, origin))
 
 
 def _is_unchecked_protocol(origin: type) -> bool:
     return getattr(origin, "_is_protocol", False) and not getattr(origin, "_is_runtime_protocol", False)
 
 
-def _require(fits: object, value: Any) -> Any:
+def _require(fits: object, value: Any) -> None:
     if not fits:
-        raise _Unfit
-    return value
+        raise _Unfit(value)
 
 
-def _number(value: Any) -> Any:
-    return _require(isinstance(value, Real) and not isinstance(value, bool), value)
+def _that(words: str, fits: Callable[[Any], object]) -> _Type:
+    """The type of values that fit, which stay as they are."""
+
+    def take(value: Any) -> Any:
+        _require(fits(value), value)
+        return value
+
+    return _Type(words, take)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _whole(value: Any) -> Any:
-    """A whole number as it is, or a number that is one, such as 2.0."""
-    if isinstance(value, Integral):
-        return _number(value)
-    return int(_require(float(_number(value)).is_integer(), value))
+    """Return a whole number as it is, or a number that is one, such as 2.0, as an int."""
+    _require(_is_number(value) and (isinstance(value, Integral) or float(value).is_integer()), value)
+    return value if isinstance(value, Integral) else int(value)
 
 
-_ANYTHING = _Type("anything", lambda value: value)
-_NONE = _Type("None", lambda value: _require(value is None, value))
+_ANYTHING = _that("anything", lambda _: True)
+_NONE = _that("None", lambda x: x is None)
 _PLAIN: Mapping[Any, _Type] = {
     Any: _ANYTHING,
     object: _ANYTHING,
     None: _NONE,
     NoneType: _NONE,
-    str: _Type("a text", lambda value: _require(isinstance(value, str), value)),
-    bool: _Type("True or False", lambda value: _require(isinstance(value, bool | np.bool_), value)),
+    str: _that("a text", lambda x: isinstance(x, str)),
+    bool: _that("True or False", lambda x: isinstance(x, bool | np.bool_)),
     int: _Type("a whole number", _whole),
-    float: _Type("a number", _number),
+    float: _that("a number", _is_number),
 }
 
 
-def _one_of(types: Sequence[_Type]) -> _Type:
+def _one_of(types: list[_Type]) -> _Type:
     """The first of several types that a value is of."""
 
     def take(value: Any) -> Any:
-        last = _Unfit()
+        last = _Unfit(value)
         for each in types:
             try:
                 return each.take(value)
@@ -147,13 +149,12 @@ def _one_of(types: Sequence[_Type]) -> _Type:
                 last = unfit
         raise last
 
-    *words, last = dict.fromkeys(each.words for each in types)
-    return _Type(f"{', '.join(words)} or {last}" if words else last, take)
+    *words, end = dict.fromkeys(each.words for each in types)
+    return _Type(f"{', '.join(words)} or {end}" if words else end, take)
 
 
 def _array(is_truth: bool) -> _Type:
     """An array of real numbers; or of truth values, which may be 0 and 1."""
-
     usual = np.dtype(np.bool_ if is_truth else np.float64)
 
     def take(value: Any) -> Any:
@@ -162,10 +163,8 @@ def _array(is_truth: bool) -> _Type:
         try:
             array = np.asarray(value)
         except ValueError:
-            raise _Unfit from None
-        _require(array.ndim and array.dtype.kind in "biuf", value)
-        if is_truth:
-            _require(np.isin(array, (0, 1)).all(), value)
+            raise _Unfit(value) from None
+        _require(array.ndim and array.dtype.kind in "biuf" and (not is_truth or np.isin(array, (0, 1)).all()), value)
         return array
 
     return _Type("an array of True and False" if is_truth else "an array of real numbers", take)
@@ -177,8 +176,8 @@ def _mapping(name: _Type, entry: _Type) -> _Type:
     def take(value: Any) -> Any:
         _require(isinstance(value, Mapping), value)
         for key, each in value.items():
-            _take_entry(name, key)
-            _take_entry(entry, each)
+            name.take(key)
+            entry.take(each)
         return value
 
     return _Type(f"a mapping from {name.words} to {entry.words}", take)
@@ -188,19 +187,14 @@ def _several(origin: type, within: tuple[Any, ...]) -> _Type:
     """Several values, made a tuple or a set where one is needed; a text is one of them, never its letters."""
     entries = [_read(each) for each in within if each is not Ellipsis]
     count = len(entries) if origin is tuple and Ellipsis not in within else None
-    made: Any = origin if origin in (tuple, list, set, frozenset) else tuple
+    make: Any = origin if origin in (tuple, list, set, frozenset) else tuple
 
     def take(value: Any) -> Any:
         several = (value,) if isinstance(value, str) else value
-        try:
-            given = tuple(several)
-        except TypeError:
-            raise _Unfit from None
+        _require(isinstance(several, Iterable), value)
+        given = tuple(several)
         _require(count in (None, len(given)), value)
-        types = entries if count else entries * len(given)
-        taken = [_take_entry(one, each) for one, each in zip(types, given, strict=True)]
-        unchanged = isinstance(several, origin) and all(a is b for a, b in zip(taken, given, strict=True))
-        return several if unchanged else made(taken)
+        return _remade(several, given, entries if count else entries * len(given), origin, make)
 
     if count is None:
         return _Type(f"a list (each entry {entries[0].words})", take)
@@ -214,16 +208,13 @@ def _named_tuple(origin: Any) -> _Type:
 
     def take(value: Any) -> Any:
         _require(isinstance(value, tuple | list) and least <= len(value) <= len(types), value)
-        taken = origin(*map(_take_entry, types, value))
-        unchanged = isinstance(value, origin) and all(a is b for a, b in zip(taken, value, strict=True))
-        return value if unchanged else taken
+        return _remade(value, tuple(value), types[: len(value)], origin, lambda entries: origin(*entries))
 
     return _Type(add_article(origin.__name__), take)
 
 
-def _take_entry(of: _Type, value: Any) -> Any:
-    try:
-        return of.take(value)
-    except _Unfit as unfit:
-        unfit.entry = value if unfit.entry is None else unfit.entry
-        raise
+def _remade(value: Any, given: tuple[Any, ...], types: list[_Type], origin: type, make: Callable[[Any], Any]) -> Any:
+    """Return a value as it is if its entries are of their types, else what is made of them."""
+    taken = [one.take(each) for one, each in zip(types, given, strict=True)]
+    is_same = isinstance(value, origin) and all(a is b for a, b in zip(taken, given, strict=True))
+    return value if is_same else make(taken)

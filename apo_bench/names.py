@@ -1,90 +1,54 @@
-"""Everything a user may bring comes by short name, as `module:name`, or as the object itself.
-
-A command also finds such a module in the current folder, which is on no path: what else lies there is not imported.
-"""
+"""Everything a user may bring comes by short name, as `module:name`, or as the object itself."""
 
 from __future__ import annotations
 
 import importlib
 import inspect
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder
-from types import FrameType, ModuleType
-from typing import Any, final
+from types import ModuleType
+from typing import Any
 
 from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 
-
-@final
-class OwnModules:
-    """Finds modules in one folder, after all other places: those admitted by name, and what they import in turn.
-
-    Where a dependency tries an optional package, as `pandas`, a file of that name in the folder is not its package.
-    """
-
-    def __init__(self, folder: str) -> None:
-        self.folder = folder
-        self._admitted: set[str] = set()
-        self._found: set[str] = set()
-
-    def admit(self, module: str) -> None:
-        """Let a module be found, by its whole name."""
-        self._admitted.add(module.partition(".")[0])
-
-    def find_spec(self, name: str, path: Sequence[str] | None, _: ModuleType | None = None) -> ModuleSpec | None:
-        """As the import system asks; submodules are found by the path of their package."""
-        if path is not None or not (name in self._admitted or _importer() in self._found):
-            return None
-        spec = PathFinder.find_spec(name, [self.folder])
-        if spec is not None:
-            self._found.add(name)
-        return spec
-
-
-def _importer() -> str:
-    """The package or module whose code imports something now."""
-    frame: FrameType | None = sys._getframe(2)
-    while frame is not None:
-        name = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if name not in ("importlib", "_frozen_importlib", "_frozen_importlib_external"):
-            return name
-        frame = frame.f_back
-    return ""
+SESSION = "session"
+"""The module part of the name of a function that cannot be imported: `session:mine`."""
+_FOLDERS: list[str] = []
+"""Where modules that a person names may lie, too; the last one counts."""
 
 
 @contextmanager
 def own_modules_in(folder: str) -> Iterator[None]:
-    """For a while, find in a folder the modules that are named as `module:name`; nowhere if it is empty."""
-    before = [finder for finder in sys.meta_path if isinstance(finder, OwnModules)]
-    finder = OwnModules(folder)
-    for other in before:
-        sys.meta_path.remove(other)
-    if folder:
-        sys.meta_path.append(finder)
+    """Find modules that are named as `module:name` in a folder as well, for a while.
+
+    While such a module is imported, it finds what lies beside it. Nothing else in the folder is ever imported.
+    """
+    _FOLDERS.append(folder)
     try:
         yield
     finally:
-        if folder:
-            sys.meta_path.remove(finder)
-        sys.meta_path.extend(before)
+        _FOLDERS.pop()
+
+
+def add_own_modules(folder: str) -> None:
+    """Find modules in a folder as `own_modules_in` does, from now on; nowhere if it is empty."""
+    _FOLDERS.extend([folder] * bool(folder))
 
 
 def folder_of_own_modules() -> str:
-    """The folder of `own_modules_in`, for another process; empty without one."""
-    return next((finder.folder for finder in sys.meta_path if isinstance(finder, OwnModules)), "")
+    """Return the folder of `own_modules_in`, for another process; empty without one."""
+    return _FOLDERS[-1] if _FOLDERS else ""
 
 
-def admit(module: str) -> None:
-    """Say that a person named a module, so that it is found in the folder of `own_modules_in` too."""
-    for finder in sys.meta_path:
-        if isinstance(finder, OwnModules):
-            finder.admit(module)
+def find_own_module(name: str) -> ModuleSpec | None:
+    """Find a module that lies in the folder of `own_modules_in`; None if there is none."""
+    return PathFinder.find_spec(name, _FOLDERS[-1:])
 
 
 def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
-    """The object a name stands for; anything that is not a string is returned as it is.
+    """Return the object a name stands for; anything that is not a string is returned as it is.
 
     Args:
         given: A short name out of `known`, `"package.module:name"`, or the object itself.
@@ -104,9 +68,8 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
         module_name and attribute and not module_name.startswith("."),
         f"the {kind} '{given}' is not of the form 'package.module:name'; name a module and what is in it.",
     )
-    admit(module_name)
     try:
-        module = importlib.import_module(module_name)
+        module = _import_named(module_name)
     except ImportError as error:
         raise InputError(
             f"the {kind} '{given}' cannot be imported ({error}); start in the folder of its module, "
@@ -123,15 +86,39 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
     return value
 
 
+def _import_named(name: str) -> ModuleType:
+    """Import a module that a person named."""
+    before = sys.path[:]
+    if find_own_module(name.partition(".")[0]) is not None:
+        sys.path += _FOLDERS[-1:]
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path[:] = before
+
+
 def _public(module: Any) -> list[str]:
-    """What a module offers: neither the modules that it imports nor functions and classes of other packages."""
-    return [name for name, value in vars(module).items() if not name.startswith("_") and _own(value, module.__name__)]
+    """List what a module offers: neither modules nor functions and classes of other packages."""
+    package = module.__name__.partition(".")[0]
+    names = []
+    for name, value in vars(module).items():
+        made = inspect.isroutine(value) or inspect.isclass(value)
+        where = str(getattr(value, "__module__", package)) if made else package
+        own = not name.startswith("_") and not inspect.ismodule(value) and not isinstance(value, type(annotations))
+        if own and where.partition(".")[0] == package:
+            names.append(name)
+    return names
 
 
-def _own(value: Any, module: str) -> bool:
-    """Not what `import` or `from __future__ import` put there, nor a function or class of another package."""
-    if inspect.ismodule(value) or isinstance(value, type(annotations)):
-        return False
-    made = inspect.isroutine(value) or inspect.isclass(value)
-    where = getattr(value, "__module__", None) if made else None
-    return not isinstance(where, str) or where.partition(".")[0] == module.partition(".")[0]
+def importable_name(function: Any) -> str | None:
+    """Return `module:name` of a function or class that another process can import; None of any other object."""
+    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
+    if module in (None, "__main__") or "<" in name or getattr(sys.modules.get(module), name, None) is not function:
+        return None
+    return f"{module}:{name}"
+
+
+def function_name(function: Any) -> str:
+    """Return the name of a function for records: `module:name`, or `session:name` if it cannot be imported."""
+    label = getattr(function, "__name__", type(function).__name__)
+    return importable_name(function) or f"{SESSION}:{label.strip('<>')}"

@@ -19,8 +19,8 @@ from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash
+from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
-from apo_bench.trial.trial import trial_row
 
 _MOST = 100_000
 """Trials that a test may take; with the usual error it takes some dozens."""
@@ -140,7 +140,7 @@ def _outcomes(cells: list[TrialConfig], seed: int, method: Any, said: list[str])
             scene = scene_of(settings)
             scenes[key] = scene, content_hash(scene.scenario, settings.scenario, scene.arm.files)
         scene, content = scenes[key]
-        row = trial_row(settings, scene, demonstration_of(settings, scene), content, method=method)
+        row = record_trial(settings, scene, demonstration_of(settings, scene), content, method=method)
         if row["success"] is not None:
             said += [str(row["sentence"])] * (not row["success"])
             yield row["success"]

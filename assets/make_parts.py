@@ -21,8 +21,8 @@ from apo_bench.scenario.parts.making import (
     join,
     polygon,
     rectangle,
+    revolve,
     shaft,
-    turned,
     write_part,
 )
 
@@ -75,7 +75,7 @@ def housing() -> Body:
 
 def bush() -> Body:
     """32 mm thick, 60 mm long, with a bore of 16 mm."""
-    return turned(
+    return revolve(
         [Frustum(0, 60, 16, name="outer")], [Frustum(0, 60, 8, name="bore", fit=True)], flats={0: "low", 60: "high"}
     )
 
@@ -169,7 +169,7 @@ def axle() -> Body:
         Frustum(20, 59, 5, name="neck"),
         Frustum(59, 60, 5, 4, name="neck_chamfer"),
     ]
-    return turned(steps, flats={0: "tip", 15: "shoulder", 20: "ledge", 60: "head"})
+    return revolve(steps, flats={0: "tip", 15: "shoulder", 20: "ledge", 60: "head"})
 
 
 def stand() -> Body:
@@ -180,7 +180,7 @@ def stand() -> Body:
 
 def disc() -> Body:
     """A gear without teeth: 40 mm across, 14 mm thick, with a bore of 10 mm."""
-    return turned([Frustum(0, 14, 20)], [Frustum(0, 14, 5, name="bore", fit=True)], flats={0: "low", 14: "high"})
+    return revolve([Frustum(0, 14, 20)], [Frustum(0, 14, 5, name="bore", fit=True)], flats={0: "low", 14: "high"})
 
 
 def gear_cover() -> Body:

@@ -1,10 +1,9 @@
 """The corrector of the paper with one thing taken away, to see what each is worth.
 
-Methods of a sweep from the folder of a clone:
+They are methods of a sweep from the folder of a clone:
 
-    apo-bench sweep stick_in_tower carried_bridge vanished_fixture pocket_table --noise-level 2 --human-error-scale 1 --trials 20 \\
-        --method paper,benchmarks.ablations:last_only,benchmarks.ablations:minimal,benchmarks.ablations:no_history,\
-benchmarks.ablations:no_disappeared --out runs/ablations
+    apo-bench sweep stick_in_tower carried_bridge vanished_fixture pocket_table --noise-level 2 --human-error-scale 1 \\
+        --method paper,benchmarks.ablations:last_only,benchmarks.ablations:minimal --trials 20 --out runs/ablations
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,13 +14,14 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Correction, Observation, Operation, largest, largest_gap, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.track import candidates, solve_own_contacts, track_operations
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
+from apo_bench.correction.baselines.track import track_operations
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 from apo_bench.geometry import Array
 
-MOST_SETS = 255
-"""Sets that `minimal` tries at a step: every set of 8 candidates; of more, the smallest ones."""
+MOST_SETS = 255  # sets that `minimal` tries at a step: every set of 8 candidates, or the smallest of more
 
 
 def last_only(observation: Observation) -> Correction:

@@ -47,7 +47,7 @@ print(count)
 """
 MAKE = """
 import gymnasium, numpy, apo_bench
-env = gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0)
+env = gymnasium.make("APOReplay-v0", scenario="block_on_block", noise_level=0.0, human_error_scale=0.0)
 env.reset(seed=0)
 print(env.step(numpy.zeros(env.action_space.shape))[1])
 """
@@ -61,7 +61,7 @@ for each in metadata.distributions():
 print(json.dumps(found))
 """
 TIME = "import time; began = time.process_time(); import apo_bench; print(time.process_time() - began)"
-TRIAL = ("replay", "stick_in_tower", "--seed", "7", "--fidelity", "near-contact", "--json")
+TRIAL = ("run", "stick_in_tower", "--seed", "7", "--fidelity", "near-contact", "--json")
 CORRECT = ("correct", "stick_in_tower", "--observation", "seen.csv", "--method", "contact")
 SWEEP = (
     *(

@@ -1,4 +1,4 @@
-"""Assemblies of three to eight parts with random dimensions: part files, poses, and scenarios made without a hand.
+"""Assemblies of three to eight parts with random dimensions: part files, poses, and scenarios without manual work.
 
 Plates, pins, bushes, brackets, covers, slots and rings; lengths in mm. `generated_rates.py` measures them.
 """
@@ -14,7 +14,6 @@ import numpy as np
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.records import TrialConfig
 from apo_bench.scenario.parts.making import (
     Body,
     Frustum,
@@ -23,18 +22,16 @@ from apo_bench.scenario.parts.making import (
     join,
     polygon,
     rectangle,
+    revolve,
     shaft,
-    turned,
     write_part,
 )
-from apo_bench.trial.stages import scene_of
-from apo_bench.trial.trial import run_trial
 
 DENSITY = 700.0
 
 
 class Place(NamedTuple):
-    """Where a copy of a part is in the end."""
+    """The final pose of a copy of a part."""
 
     part: str
     name: str
@@ -43,14 +40,14 @@ class Place(NamedTuple):
 
 
 class Assembled(NamedTuple):
-    """An assembly as a CAD program would have it."""
+    """An assembly as a CAD program exports it."""
 
     parts: Mapping[str, Body]
     places: tuple[Place, ...]
 
 
 def generated(seed: int) -> Assembled:
-    """One assembly; the same for the same seed."""
+    """Draw the assembly of a seed."""
     rng = np.random.default_rng([seed, 18])
     return FAMILIES[seed % len(FAMILIES)](lambda low, high: round(float(rng.uniform(low, high)), 1), rng)
 
@@ -97,10 +94,10 @@ def bushed(between: Between, rng: np.random.Generator) -> Assembled:
     block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
     inner = [Frustum(0, thick + flange, r + play, name="bore")]
     walls = [Frustum(0, thick, outer, name="side"), Frustum(thick, thick + flange, outer + 4, name="rim")]
-    bush = turned(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
+    bush = revolve(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
     long = thick + flange - 2
     head = between(12, 16)
-    pin = turned(
+    pin = revolve(
         [Frustum(0, long, r, name="side"), Frustum(long, long + head, r + 3, name="grip")],
         flats={0.0: "tip", long: "ledge", long + head: "head"},
     )
@@ -176,7 +173,7 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
         r, 0, round(high + between(24, 30), 1), "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head"
     )
     thick = between(10, 14)
-    ring = turned(
+    ring = revolve(
         [Frustum(0, thick, r + between(6, 8), name="side")],
         [Frustum(0, thick, r + play, name="bore")],
         flats={0.0: "bottom", thick: "top"},
@@ -210,7 +207,9 @@ def stacked(between: Between, rng: np.random.Generator) -> Assembled:
         places.append(Place(f"plate_{i}", f"plate_{i}", (0, 0, round(z, 1))))
         z += h
     inner = [Frustum(0, 10, r + play, name="bore")]
-    parts["cap"] = turned([Frustum(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"})
+    parts["cap"] = revolve(
+        [Frustum(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"}
+    )
     places.append(Place("cap", "cap", (0, 0, round(z, 1))))
     return Assembled(parts, tuple(places))
 
@@ -219,7 +218,7 @@ FAMILIES = (pinned, bushed, bracketed, slotted, stacked)
 
 
 def write(made: Assembled, folder: Path) -> Path:
-    """Part files and poses; returns the file of poses."""
+    """Write part files and poses, and return the file of poses."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, body in made.parts.items():
         write_part(name, body, folder, density=DENSITY, source="benchmarks/generated.py", licence="CC0-1.0")
@@ -234,18 +233,9 @@ def write(made: Assembled, folder: Path) -> Path:
 
 
 def scenario_of(seed: int, folder: Path) -> Path:
-    """The scenario file of one assembly, made without a hand."""
+    """Write the scenario file of the assembly of a seed."""
     poses = write(generated(seed), folder)
     path = folder / f"generated_{seed}.toml"
     made = new_scenario(on_the_table(read_posed(poses)))
     write_scenario(made, path, f"Generated assembly {seed}", poses.name)
     return path
-
-
-def rate(path: Path, method: str, seeds: int, fidelity: str) -> tuple[int, int]:
-    """How many trials at 1 mm and 1 degree are right, of how many that count."""
-    asked = [TrialConfig(str(path), method=method, seed=seed, fidelity=fidelity) for seed in range(seeds)]
-    scene = scene_of(asked[0]) if asked else None
-    rows = [run_trial(each, scene) for each in asked]
-    counted = [row["success"] for row in rows if row["success"] is not None]
-    return sum(map(bool, counted)), len(counted)

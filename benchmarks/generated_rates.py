@@ -1,8 +1,8 @@
-"""Ten assemblies of random dimensions, without a hand: `python benchmarks/generated_rates.py FOLDER [--seeds 20]`.
+"""Run ten assemblies of random dimensions without manual work: `python benchmarks/generated_rates.py FOLDER`.
 
-Writes part files, poses and a scenario of each assembly, checks it, and runs `oracle`, `contact` and `none` at 1 mm and
-1 degree, seed after seed, so that every assembly has as many. Rows are kept in FOLDER/rows.csv; what is there is not
-run again. At the end results/generated.csv and the tables of docs/results/generated.md are written.
+Writes part files, poses and a scenario of each assembly, checks it, and runs trials at 1 mm and 1 degree, seed after
+seed. FOLDER/rows.csv keeps the trials, and a second run continues there. Writes results/generated.csv and the tables of
+docs/results/generated.md.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import imageio.v3 as imageio
 import numpy as np
 
 from apo_bench.assembly import placements
-from apo_bench.benchmark.analysis import wilson
+from apo_bench.benchmark.analysis import Rate
 from apo_bench.importers.assembly.checking import check_file
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.records import TrialConfig
@@ -29,9 +29,10 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of
+from benchmarks.rates_by_condition import counted
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "generated.csv"
@@ -39,45 +40,42 @@ PAGE = ROOT / "docs" / "results" / "generated.md"
 PICTURE = ROOT / "docs" / "pictures" / "generated.png"
 FIRST = "<!-- rates -->"
 LAST = "<!-- end of rates -->"
-"""Around what is written into the page."""
 COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
-CHECK = "check"
-"""In place of a method: all but the trials of `scenario check`."""
-FEW = 5
+CHECK = "check"  # in place of a method: `scenario check` without its trials
+FEW = 5  # seeds of all methods; `contact` has more
 METHODS = ("oracle", "contact", "uncorrected", "snap", "snap+spiral", "nominal")
-"""Seeds of all methods; of `contact` there are more."""
 HEADS = {"oracle": "`oracle`"} | {method: f"`{method}` at 1 mm" for method in METHODS[1:]}
 
 Line = Mapping[str, str]
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("folder", type=Path)
-    asked.add_argument("--assemblies", type=int, default=10)
-    asked.add_argument("--seeds", type=int, default=20)
-    given = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--assemblies", type=int, default=10)
+    parser.add_argument("--seeds", type=int, default=20)
+    given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     rows = given.folder / "rows.csv"
     if not rows.exists():
         rows.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
-    for line in measured(given.folder, given.assemblies, given.seeds, lines_of(rows)):
+    for line in run(given.folder, given.assemblies, given.seeds, read_lines(rows)):
         with rows.open("a", encoding="utf-8", newline="") as file:
             csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(line)
         print(*line.values(), flush=True)
-    keep(lines_of(rows))
+    keep(read_lines(rows))
     draw([given.folder / f"generated_{k}" / f"generated_{k}.toml" for k in range(len(FAMILIES))])
 
 
-def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -> Iterator[Line]:
-    """Checks, then trials seed by seed; nothing that is known already."""
+def run(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -> Iterator[Line]:
+    """Yield checks, then trials seed by seed, that are not known."""
     there = {(line["assembly"], line["method"], line["seed"]) for line in known}
     paths = {str(k): folder / f"generated_{k}" / f"generated_{k}.toml" for k in range(assemblies)}
     for name, path in paths.items():
         if not path.exists():
             scenario_of(int(name), path.parent)
         if (name, CHECK, "") not in there:
-            yield checked(name, path)
+            yield check(name, path)
     scenes: dict[str, Scene] = {}
     for seed in range(seeds):
         for name, path in paths.items():
@@ -97,21 +95,21 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
                 yield dict(zip(COLUMNS, ("" if cell is None else str(cell) for cell in cells), strict=True))
 
 
-def checked(name: str, path: Path) -> Line:
-    """What `scenario check` finds before any trial; if nothing is wrong, what the scenario has."""
+def check(name: str, path: Path) -> Line:
+    """Return what `scenario check` finds before any trial, or the size of a right scenario."""
     found = tuple(check_file(path, seeds=0))
     wrong = [each.sentence for each in found if not each.ok]
     cells = (name, CHECK, "", str(int(not wrong)), "", "", "", "; ".join(wrong) or found[0].sentence)
     return dict(zip(COLUMNS, cells, strict=True))
 
 
-def lines_of(path: Path) -> list[Line]:
+def read_lines(path: Path) -> list[Line]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
 def keep(lines: Sequence[Line]) -> None:
-    """Write the rows in order, of seeds that every assembly has, and the tables into the page."""
+    """Write the trials of seeds that every assembly has, in order, and the tables of the page."""
     order = (CHECK, *METHODS)
     names = {line["assembly"] for line in lines}
     seen = Counter((line["method"], line["seed"]) for line in lines)
@@ -127,7 +125,7 @@ def keep(lines: Sequence[Line]) -> None:
 
 
 def draw(paths: Sequence[Path]) -> None:
-    """The assemblies side by side, every part at its goal."""
+    """Draw the assemblies side by side, every part at its nominal pose."""
     views = []
     for path in paths:
         scene = build_scene(load_scenario(path))
@@ -150,7 +148,7 @@ def tables(lines: Sequence[Line]) -> str:
         made.append(f"| {name} | {' | '.join(_cells(int(name), own, methods))} |")
     every = " | ".join(rate(lines, method) for method in methods)
     made += [
-        f"| all | | | | {rate(lines, CHECK, False)} | {every} |",
+        f"| all | | | | {rate(lines, CHECK)} | {every} |",
         "",
         "Trials of `oracle` and `contact` that fail:",
         "",
@@ -170,13 +168,10 @@ def _cells(assembly: int, own: Sequence[Line], methods: Sequence[str]) -> Iterat
     yield from (rate(own, method) for method in methods)
 
 
-def rate(lines: Sequence[Line], method: str, interval: bool = True) -> str:
-    """Successes of those that count, with Wilson's 95 % interval."""
-    counted = [line["success"] == "1" for line in lines if line["method"] == method and line["success"]]
-    if not counted:
-        return ""
-    low, high = wilson(sum(counted), len(counted))
-    return f"{sum(counted)} of {len(counted)}" + (f" ({100 * low:.0f} to {100 * high:.0f} %)" if interval else "")
+def rate(lines: Sequence[Line], method: str) -> str:
+    """Return the successes of the trials that count, with Wilson's 95 % interval."""
+    ends = [line["success"] == "1" for line in lines if line["method"] == method and line["success"]]
+    return counted(Rate(sum(ends), len(ends)))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ SETTINGS: dict[str, str] = {}
 """Settings of trials, arguments of environments and columns of records: neutral name -> name today."""
 VALUES: dict[str, str] = {}
 """Values of settings, and correctors."""
-EXPORTS = {"detect_contacts": "recognise"}
+EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
 KEYS = {
     "seen_again": "reobservations",
@@ -54,7 +54,7 @@ DROPPED = {
     ),
     *("pose_source", "noise", "grasp", "arm", "robot_error", "contact_source", "method", "max_reobservations"),
     *("ft_sensor", "assumed_robot_error", "min_predicted_success", "seed", "secret_seed", "timestep_s", "fidelity"),
-    *("level", "sentence", "joint_control", "why", "trace", "assembly", "believed"),
+    *("human_covariance", "level", "sentence", "joint_control", "why", "trace", "assembly", "believed"),
 }
 """Not kept of what the package returns, by neutral names: settings, texts, provenance, iterations of solvers."""
 

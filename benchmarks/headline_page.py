@@ -1,156 +1,211 @@
-"""The page of the headline: the first look, all rates, where it breaks, and what was run."""
+"""The page of the headline: the summary, all rates, the limits, and what ran."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import Cell, Paired
+from apo_bench.benchmark.analysis import Cell, Paired, Rate, wilson
+from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.grid import described, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.records import SETTINGS, TrialConfig
-from benchmarks.headline_look import TOLD_LEVEL, Look, block, robot_scenarios
-from benchmarks.headline_tables import differing, rates, together, widths
+from apo_bench.records import SETTINGS, TrialConfig, is_uncorrected
+from benchmarks.headline_summary import NOISE, Summary, block, robot_scenarios
+from benchmarks.rates_by_condition import counted, table
 
 GRID = Path(__file__).with_name("headline.toml")
 METHODS = ("uncorrected", "spiral-search", "snap", "nominal", "paper", "contact", "contact-robust")
-COMPARED = ("contact", "contact-robust")
-"""With `paper`, seed by seed."""
-ROBOT_METHODS = {"oracle": 0.0, "contact-robust": TOLD_LEVEL, "contact-robust+spiral": TOLD_LEVEL}
-"""Those that were run with errors of the robot, and their level."""
-BY_CONSTRUCTION = (
-    "`none` is 0 here by construction: castle 2 (in pocket_table cube 2) is shown 1.5 to 4 mm off, and the play of the "
-    "fits is 0.25 mm."
-)
+COMPARED = ("contact", "contact-robust")  # with `paper`, seed by seed
+ROBOT_METHODS = {"oracle": 0.0, "contact-robust": NOISE, "contact-robust+spiral": NOISE}
+"""Methods that ran with errors of the robot, and their noise in mm and degrees."""
 OUTLIERS = (
-    f"Level {TOLD_LEVEL:g}, careful humans: `outliers` makes 10 % of the errors ten times as large and misses 2 % of "
-    "the operations; `megapose-tless` is what was measured of a pose estimator: it misses 26 % of the parts and is far "
-    "off in 24 % of the others ([noise models](../reference/noise-models.md)). Most methods refuse to correct what was "
-    "not seen."
+    f"{NOISE:g} mm and degree, no human error. `outliers` makes 10 % of the errors ten times as large and misses 2 % "
+    "of the operations. `megapose-tless` was measured of a pose estimator: it misses 26 % of the parts and has gross "
+    "errors in 24 % of the others ([noise models](../reference/noise-models.md)). Most methods do not correct where "
+    "an operation was not observed."
 )
 ROBOT = (
-    f"Level {TOLD_LEVEL:g}, careful humans; a [robot error](../guide/arm.md#what-is-wrong-with-the-robot-itself) is "
-    "drawn anew for every trial, with standard deviations in mm and degrees. Contacts repair the eye's error, not the "
-    "robot's: `oracle` replays the truth and meets no noise, and fails as well."
+    f"{NOISE:g} mm and degree, no human error. Every trial draws a [robot "
+    "error](../guide/arm.md#what-is-wrong-with-the-robot-itself); the numbers are standard deviations in mm and "
+    "degrees. Contacts correct the errors of the camera, not those of the robot: `oracle`, which has the true poses, "
+    "fails as well."
 )
-OLDER = " **`benchmarks/headline.toml` asks for other trials by now; these rows are older.**"
+OLDER = " **`benchmarks/headline.toml` has changed since.**"
+Words = Callable[[Cell], tuple[str, ...]]
 
 
-def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement: Sequence[str]) -> list[str]:
-    """The first look, all rates, and what was run."""
-    least = min(cell.trials for cell in look.cells)
-    plain = [c for c in look.cells if c.noise == TrialConfig.noise and c.robot_error == TrialConfig.robot_error]
-    held = sorted((c for c in plain if c.method in METHODS), key=in_order)
-    broken = sorted((c for c in look.cells if c.noise != TrialConfig.noise), key=in_order)
-    robot = sorted((c for c in look.cells if of_robot(c, robot_scenarios(look.cells))), key=by_error)
+def page(summary: Summary, pairs: Sequence[Paired], ran: Mapping[str, Any], fidelity: Sequence[str]) -> list[str]:
+    """Return the lines of the page."""
+    least = min(cell.trials for cell in summary.cells)
+    plain = [c for c in summary.cells if c.noise == TrialConfig.noise and c.robot_error == TrialConfig.robot_error]
+    main = sorted((c for c in plain if c.method in METHODS), key=_order)
+    outliers = sorted((c for c in summary.cells if c.noise != TrialConfig.noise), key=_order)
+    robot = sorted((c for c in summary.cells if _is_of_robot(c, robot_scenarios(summary.cells))), key=_robot_order)
     other = [c for c in plain if c.method not in (*METHODS, *ROBOT_METHODS)]
-    oracle = [c for c in plain if c.method == "oracle"]
+    oracle = [f"{c.successes} of {c.trials} ({c.scenario})" for c in plain if c.method == "oracle"]
     return [
         "# The headline",
         "",
-        *block(look, "../pictures", None),
+        *block(summary, "../pictures", None),
         "",
         "## All rates",
         "",
         "Success in percent: the finished assembly is right ([the judge](../how/judge.md)); in brackets: also built as "
-        "it was demonstrated, where that is less. Columns are levels: L is a standard deviation of L mm and L degrees "
-        "per axis. [Methods](../reference/methods.md): `none` replays what was seen, `search` also feels for the "
-        "holes, `paper` corrects as the paper does, `contact` as [this project](../how/contact.md) does; all with the "
-        f"same seeds. {widths(least)} `benchmarks/results/headline/table.csv` has the intervals of all cells.",
+        "demonstrated, where that is less. Columns are the noise in mm and degrees (1 sigma per axis). The reference "
+        "describes the [methods](../reference/methods.md). All methods have the same seeds. "
+        f"{_widths(least)} `benchmarks/results/headline/table.csv` has all intervals.",
         "",
-        "### Careful humans",
+        "### Without human error",
         "",
-        "They put parts where they belong.",
+        *rates([c for c in main if c.human_error_scale == 0.0], ("scenario", "method"), _name, lambda c: c.noise_mm),
         "",
-        *rates([c for c in held if c.human_error_scale == 0.0], ("scenario", "method"), named, lambda c: c.noise_level),
+        "### With human error",
         "",
-        "### Careless humans",
+        "The human puts parts 1.5 to 4 mm aside and adjusts them later, as in the paper. `uncorrected` cannot succeed: "
+        "the clearance is 0.25 mm. A search cannot undo what stands aside before anything is inserted.",
         "",
-        f"They put parts wrong and adjust them later, as in the paper. {BY_CONSTRUCTION} What stands wrong to each "
-        "other before anything is inserted cannot be searched away.",
+        *rates([c for c in main if c.human_error_scale == 1.0], ("scenario", "method"), _name, lambda c: c.noise_mm),
         "",
-        *rates([c for c in held if c.human_error_scale == 1.0], ("scenario", "method"), named, lambda c: c.noise_level),
-        "",
-        *section("## Where it breaks: outliers", OUTLIERS, ("noise", "method"), broken),
-        *section("## Where it breaks: the robot's own error", ROBOT, ("robot error", "method"), robot),
-        "## Other methods at level 2, careless humans",
+        *_section("## Limits: outliers", OUTLIERS, "noise", lambda c: (f"`{c.noise}`", f"`{c.method}`"), outliers),
+        *_section(
+            "## Limits: the robot's own error",
+            ROBOT,
+            "robot error",
+            lambda c: (f"`{c.robot_error}`", f"`{c.method}`"),
+            robot,
+        ),
+        "## Other methods at 2 mm and degrees, with human error",
         "",
         *rates(other, ("method",), lambda c: (f"`{c.method}`",), lambda c: c.scenario),
         "",
-        "Without any error, `oracle`, which replays the drawn layout, is right in "
-        + ", ".join(f"{c.successes} of {c.trials} ({c.scenario})" for c in oracle)
-        + ".",
+        f"Without any error `oracle`, which has the true poses, is right in {', '.join(oracle)}.",
         "",
         "## Pairs",
         "",
-        *differing(pairs, COMPARED),
+        *_differences(pairs),
         "",
-        "## What was run",
+        "## Run",
         "",
-        what_ran(ran, least),
+        _describe_run(ran, least),
         "",
-        *agreement,
+        *fidelity,
     ]
 
 
-def what_ran(ran: Mapping[str, Any], least: int) -> str:
-    """Command, size, time and versions; and whether the sweep file asks for something else by now."""
+def rates(cells: Sequence[Cell], heads: Sequence[str], row: Words, column: Callable[[Cell], Hashable]) -> list[str]:
+    """Return a table of success in percent: a line per `row`, in the order of the cells, and a column per `column`."""
+    columns = sorted({column(cell) for cell in cells}, key=lambda name: (isinstance(name, str), name))
+    found: dict[tuple[str, ...], dict[Hashable, str]] = {}
+    for cell in cells:
+        found.setdefault(row(cell), {})[column(cell)] = _both(cell)
+    names = [f"{name:g}" if isinstance(name, float) else str(name) for name in columns]
+    lines = [(*words, *(own.get(name, "") for name in columns)) for words, own in found.items()]
+    return table((*heads, *names), lines)
+
+
+def _both(cell: Cell) -> str:
+    success, demonstrated = (f"{100 * (rate or 0.0):.0f}" for rate in (cell.rate, cell.demonstrated_rate))
+    return success if success == demonstrated else f"{success} ({demonstrated})"
+
+
+def _widths(trials: int) -> str:
+    low, half, high = (wilson(round(share * trials), trials) for share in (0.0, 0.5, 1.0))
+    return (
+        f"Of {trials} trials, 0 % has a 95 % interval (Wilson) of 0 to {100 * low.high:.0f} %, 50 % one of "
+        f"{100 * half.low:.0f} to {100 * half.high:.0f} %, 100 % one of {100 * high.low:.0f} to 100 %."
+    )
+
+
+def _section(title: str, text: str, head: str, row: Words, cells: Sequence[Cell]) -> list[str]:
+    """Return a table with a column per scenario, and one of all with its interval."""
+    lines = rates(cells, (head, "method"), row, lambda cell: cell.scenario)
+    groups: dict[tuple[str, ...], list[Cell]] = {}
+    for cell in cells:
+        groups.setdefault(row(cell), []).append(cell)
+    pooled = [Rate(sum(c.successes for c in own), sum(c.trials for c in own)) for own in groups.values()]
+    added = [" all |", "---|", *(f" {counted(rate)} |" for rate in pooled)]
+    return [title, "", text, "", *map("".join, zip(lines, added, strict=True)), ""]
+
+
+def _differences(pairs: Sequence[Paired]) -> list[str]:
+    compared = [p for p in pairs if p.place.method in COMPARED and not is_uncorrected(p.place.method) and p.pairs]
+    apart = [p for p in compared if p.only_method or p.only_reference]
+    lines = []
+    for p in apart:
+        low, high = (100 * x for x in p.interval)
+        human = f"{p.place.human_error_scale:g}"
+        difference = f"{100 * (p.difference or 0.0):+.1f} ({low:+.1f} to {high:+.1f})"
+        place = (p.place.scenario, human, f"{p.place.noise_mm:g}", p.place.noise, f"`{p.place.method}`")
+        lines.append((*place, p.pairs, p.only_method, p.only_reference, difference, f"{p.p_adjusted:.2g}"))
+    heads = ("scenario", "human error", "noise, mm", "noise model", "method", "pairs", "it alone", "`paper` alone")
+    return [
+        f"Corrected poses against those of `paper` over the same seeds, in the {len(apart)} of {len(compared)} "
+        "conditions in which any seed ends differently: at how many seeds one method alone was right, the difference "
+        "of the rates in points with Tango's 95 % interval, and McNemar's exact p, adjusted for all (Holm).",
+        "",
+        *table((*heads, "difference", "p adjusted"), lines),
+    ]
+
+
+def _describe_run(ran: Mapping[str, Any], least: int) -> str:
     versions = ran["versions"]
     return (
-        f"Written by `python benchmarks/headline.py` from the rows of `{ran['command']}`: {ran['rows']} trials, "
-        f"{ran['replays']} replays, at least {least} trials in each cell, friction grasp, 0.25 mm clearance per side, "
-        f"fidelity `{ran['grids'][0]['fidelity']}`; {ran['simulated_hours']} hours simulated or passed over in "
-        f"{ran['worker_hours'] / ran['workers']:.2f} hours by {ran['workers']} process(es) on two cores, which did "
-        f"other work now and then. MuJoCo {versions['mujoco']}, mink {versions['mink']}, NumPy "
-        f"{versions['numpy']}, Python {ran['python']}; everything else in `benchmarks/results/headline/run.json`, rows "
-        f"(without the poses reached) in `rows.jsonl.xz` beside it.{'' if up_to_date(ran) else OLDER}"
+        f"Written by `python benchmarks/headline.py` from the trials of `{ran['command']}`: {ran['rows']} trials, "
+        f"{ran['replays']} replays, at least {least} trials in each condition, friction grasp, clearance of 0.25 mm "
+        f"per side, fidelity `{ran['grids'][0]['fidelity']}`; {ran['simulated_hours']} hours simulated or passed over "
+        f"in {ran['worker_hours'] / ran['workers']:.2f} hours by {ran['workers']} process(es) on two cores. MuJoCo "
+        f"{versions['mujoco']}, mink {versions['mink']}, NumPy {versions['numpy']}, Python {ran['python']}. "
+        "`benchmarks/results/headline/run.json` has the rest; `rows.jsonl.xz` in the same folder has the trials "
+        f"without the poses reached.{'' if is_up_to_date(ran) else OLDER}"
     )
 
 
-def up_to_date(ran: Mapping[str, Any]) -> bool:
-    """Whether rows are those of the sweep file as it is now."""
+def is_up_to_date(ran: Mapping[str, Any]) -> bool:
+    """Return whether the trials are those of the sweep file as it is now."""
     first = ran["grids"][0]
     grids = read_sweep(GRID, {"trials": first["trials"], "fidelity": first["fidelity"]})
-    # in sweeps that are older than these settings nothing abstained or felt
-    usual = {
-        SETTINGS[name].axis: [SETTINGS[name].default]
-        for name in ("ft_sensor", "assumed_robot_error", "min_predicted_success")
-    }
-    kept = [{**usual, **grid} for grid in ran["grids"]]
-    return described(grids, load_all(grids)) == kept
+    # The committed sweep is older than these settings.
+    usual = {name: [SETTINGS[name].default] for name in ("ft_sensor", "assumed_robot_error", "min_predicted_success")}
+    return described(grids, load_all(grids)) == [{**usual, **grid} for grid in ran["grids"]]
 
 
-def section(title: str, said: str, heads: tuple[str, str], cells: Sequence[Cell]) -> list[str]:
-    """A table over noises or robot errors; nothing where none was run."""
+def describe_fidelity(full: Path, near_contact: Path) -> list[str]:
+    """Return how far verdicts at fidelity near-contact are those at fidelity full."""
+    lines = []
+    for a in compare(full, near_contact).agreements:
+        low, high = a["same_verdict_low_95"], a["same_verdict_high_95"]
+        verdicts = f"{a['same_verdict']} ({100 * (a['same_verdict_rate'] or 0):.1f} %)"
+        alone = (a["right_in_first_alone"], a["right_in_second_alone"])
+        seeds = f"{a['same_verdicts_in_all']} of {a['seeds']}"
+        interval = f"{100 * low:.1f} to {100 * high:.1f} %"
+        lines.append((a["scenario"], a["trials"], verdicts, interval, a["same_stage_and_code"], *alone, seeds))
+    heads = ("scenario", "trials", "same verdict", "interval", "same ending")
+    return [
+        "## Fidelity",
+        "",
+        "The same trials at fidelity `full`, which simulates every step of every motion: how many have the same "
+        "verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of one "
+        "seed share their random numbers; the last column counts the seeds with the same verdict in all trials.",
+        "",
+        *table((*heads, "right at `full` alone", "right at `near-contact` alone", "seeds"), lines),
+    ]
 
-    def row(cell: Cell) -> tuple[str, ...]:
-        return f"`{cell.noise if heads[0] == 'noise' else cell.robot_error}`", f"`{cell.method}`"
 
-    return [title, "", said, "", *together(cells, heads, row), ""] if cells else []
-
-
-def in_order(cell: Cell) -> tuple[Any, ...]:
-    """Humans, scenarios or noises, methods from what was seen to what is corrected, levels."""
-    return (
-        cell.human_error_scale,
-        cell.noise,
-        cell.scenario,
-        (*METHODS, cell.method).index(cell.method),
-        cell.noise_level,
-    )
+def _order(cell: Cell) -> tuple[Any, ...]:
+    method = (*METHODS, cell.method).index(cell.method)
+    return cell.human_error_scale, cell.noise, cell.scenario, method, cell.noise_mm
 
 
-def by_error(cell: Cell) -> tuple[Any, ...]:
-    """Errors from none to the largest, then methods."""
+def _robot_order(cell: Cell) -> tuple[Any, ...]:
     return cell.robot_error != TrialConfig.robot_error, cell.robot_error, [*ROBOT_METHODS].index(cell.method)
 
 
-def of_robot(cell: Cell, scenarios: Sequence[str]) -> bool:
-    """Whether a cell has an error of the robot, or is the same without one."""
+def _is_of_robot(cell: Cell, scenarios: Iterable[str]) -> bool:
+    """Return whether a condition has an error of the robot, or is the same without one."""
     same = cell.scenario in scenarios and cell.noise == TrialConfig.noise and cell.human_error_scale == 0.0
-    return same and ROBOT_METHODS.get(cell.method) == cell.noise_level
+    return same and ROBOT_METHODS.get(cell.method) == cell.noise_mm
 
 
-def named(cell: Cell) -> tuple[str, ...]:
+def _name(cell: Cell) -> tuple[str, ...]:
     return cell.scenario, f"`{cell.method}`"

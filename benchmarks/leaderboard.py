@@ -16,7 +16,7 @@ from pathlib import Path
 
 from apo_bench.benchmark.scoring.entry import Entry
 from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
-from benchmarks.made_with import with_mujoco
+from benchmarks.provenance import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
 ENTRIES = ROOT / "benchmarks" / "entries"

@@ -1,4 +1,4 @@
-"""Random changes of the code, drawn with a seed over all rooms, each as likely as any other.
+"""Random changes of the code, drawn with a seed over all packages, each as likely as any other.
 
 A mutant is one operator, number, condition or statement of a function or a constant that is another one.
 """
@@ -35,7 +35,7 @@ class Mutant(NamedTuple):
     """One change of one file."""
 
     file: str
-    """Under `apo_bench`; its first folder is the room whose tests are run."""
+    """Under `apo_bench`; its first folder is the package whose tests are run."""
     line: int
     before: str
     after: str
@@ -43,23 +43,23 @@ class Mutant(NamedTuple):
     """Offset of `before` in the file, in bytes."""
 
     @property
-    def room(self) -> str:
+    def package(self) -> str:
         return self.file.split("/")[0]
 
 
 def drawn(root: Path, count: int, rng: np.random.Generator, only: Sequence[str] = ()) -> list[Mutant]:
     """Different mutants, each as likely as any other."""
-    package = root / "apo_bench"
-    rooms = rooms_of(root)
-    files = [path for path in sorted(package.rglob("*.py")) if path.relative_to(package).parts[0] in rooms]
-    every = [mutant for path in files for mutant in mutants_of(path.read_bytes(), path.relative_to(package).as_posix())]
-    every = [mutant for mutant in every if not only or mutant.room in only]
+    source = root / "apo_bench"
+    packages = packages_of(root)
+    files = [path for path in sorted(source.rglob("*.py")) if path.relative_to(source).parts[0] in packages]
+    every = [mutant for path in files for mutant in mutants_of(path.read_bytes(), path.relative_to(source).as_posix())]
+    every = [mutant for mutant in every if not only or mutant.package in only]
     numbers = rng.choice(len(every), min(count, len(every)), replace=False)
     return [every[int(number)] for number in numbers]
 
 
-def rooms_of(root: Path) -> list[str]:
-    """Rooms that have tests."""
+def packages_of(root: Path) -> list[str]:
+    """Packages that have tests."""
     return sorted(path.name for path in (root / "apo_bench").iterdir() if (root / "tests" / path.name).is_dir())
 
 
@@ -92,7 +92,7 @@ def placed(node: ast.expr | ast.stmt, source: bytes, starts: Sequence[int]) -> t
 
 
 def not_code(node: ast.AST) -> Iterator[ast.AST]:
-    """What of a node says nothing about what happens: annotations, words of messages, what a room exports."""
+    """What of a node says nothing about what happens: annotations, words of messages, what a package exports."""
     for name in ("annotation", "returns"):
         if isinstance(part := getattr(node, name, None), ast.AST):
             yield part

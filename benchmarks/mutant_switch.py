@@ -22,8 +22,8 @@ HERE = Path(__file__).parent
 LOG = HERE / "reached.log"
 LONGEST_S = 300
 """Tests that have not ended by then have noticed: most such mutants never end."""
-ROOM_S, ALL_S = 20.0, 30.0
-"""What the tests run for one mutant took together, quickest first: those of its room, then of all rooms."""
+PACKAGE_S, ALL_S = 20.0, 30.0
+"""What the tests run for one mutant took together, quickest first: those of its package, then of all packages."""
 
 active = int(os.environ.get("MUTANT", "0"))
 reader = os.environ.get("MUTANT_READER", "import")
@@ -144,12 +144,12 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     reached = tests_of(LOG.read_text().splitlines())
     by_id = {item.nodeid: item for item in session.items}
     with (HERE / "outcomes.jsonl").open("w") as file:
-        for number, room, as_text in json.loads((HERE / "mutants.json").read_text()):
+        for number, package, as_text in json.loads((HERE / "mutants.json").read_text()):
             tests = {test for test in reached[str(number)] if test in seconds}
             early = as_text or "import" in reached[str(number)]
             if early:
-                tests |= {test for test in seconds if test.startswith(f"tests/{room}/")}
-            chosen = quickest(tests, seconds, room)
+                tests |= {test for test in seconds if test.startswith(f"tests/{package}/")}
+            chosen = quickest(tests, seconds, package)
             outcome: dict[str, Any] = {"number": number, "tests": chosen, "early": early}
             if not early and chosen:
                 items = [by_id[test] for test in chosen]
@@ -174,12 +174,12 @@ def tests_of(lines: Sequence[str]) -> defaultdict[str, set[str]]:
     return direct
 
 
-def quickest(tests: set[str], seconds: dict[str, float], room: str) -> list[str]:
-    """Those of the room first, each group from the quickest on, for as long as there is time."""
+def quickest(tests: set[str], seconds: dict[str, float], package: str) -> list[str]:
+    """Those of the package first, each group from the quickest on, for as long as there is time."""
     chosen: list[str] = []
     took = 0.0
-    for of_room, limit in ((True, ROOM_S), (False, ALL_S)):
-        group = [test for test in tests if test.startswith(f"tests/{room}/") == of_room]
+    for of_package, limit in ((True, PACKAGE_S), (False, ALL_S)):
+        group = [test for test in tests if test.startswith(f"tests/{package}/") == of_package]
         for test in sorted(group, key=lambda test: (seconds[test], test)):
             if chosen and took + seconds[test] > limit:
                 break

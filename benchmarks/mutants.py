@@ -1,14 +1,12 @@
-"""How many random changes of the code the tests notice, drawn with a seed over all rooms by `mutant_draw.py`.
+"""Count the random changes of the code that the tests notice; `mutant_draw.py` draws them with a seed.
 
-    python -m benchmarks.mutants [--mutants 300] [--seed 0] [--root FOLDER] [--only ROOM ...] [--write X]
+    python -m benchmarks.mutants [--mutants 300] [--seed 0] [--root FOLDER] [--only PACKAGE ...] [--write X]
 
-All mutants stand in one copy of the checkout, each behind a switch (`mutant_switch.py`). The tests of all rooms, those
-of `tests/ROOM` but `extras`, are run once without any, which says what each reaches and how long it takes. With a
-mutant on, only the tests that reach it are run, quickest first up to 30 s, those of its room before all others, up to
-the first that fails. What no test reaches is not noticed. A mutant that runs while tests are imported gets a process of
-its own, and the tests of its room besides; so does compiled code, as text. With `--only`, mutants and tests are those
-of these rooms. What no test notices is printed with its line: some of it changes nothing that can be seen, the rest
-lacks a test. With `--root` another checkout is tried, such as one before tests were taken out. No checkout is changed.
+All mutants stand in one copy of the checkout, each behind a switch (`mutant_switch.py`). The tests of all packages
+but `extras` run once without any mutant, which shows what each test reaches and how long it takes. With a mutant on,
+only the tests that reach it run, quickest first, up to 30 s or the first failure. A mutant that runs while tests are
+imported gets its own process, and so does compiled code. Mutants that no test notices are printed. `--only` takes
+mutants and tests of some packages, `--root` another checkout, which stays as it is.
 """
 
 import argparse
@@ -29,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.mutant_draw import Mutant, changed, drawn, placed, rooms_of, starts_of
+from benchmarks.mutant_draw import Mutant, changed, drawn, packages_of, placed, starts_of
 from benchmarks.mutant_switch import LONGEST_S
 
 ROOT = Path(__file__).parents[1]
@@ -38,7 +36,7 @@ CACHE = re.compile(r"^(functools\.)?(cache|lru_cache|cached_property)\b")
 
 
 class Ran(NamedTuple):
-    """What came of the tests of a room."""
+    """What came of the tests of a package."""
 
     passed: bool
     by: str
@@ -51,15 +49,15 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=300)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--root", type=Path, default=ROOT)
-    parser.add_argument("--only", nargs="+", metavar="ROOM", default=())
+    parser.add_argument("--only", nargs="+", metavar="PACKAGE", default=())
     parser.add_argument("--write", type=Path)
     arguments = parser.parse_args()
     chosen = drawn(arguments.root, arguments.mutants, np.random.default_rng(arguments.seed), arguments.only)
     with tempfile.TemporaryDirectory() as work:
-        ran = outcomes(arguments.root, chosen, arguments.only or rooms_of(arguments.root), Path(work))
-    noticed = Counter(mutant.room for mutant, how in zip(chosen, ran, strict=True) if not how.passed)
-    for room, count in sorted(Counter(mutant.room for mutant in chosen).items()):
-        print(f"{room:14} {noticed[room]} of {count} noticed")
+        ran = outcomes(arguments.root, chosen, arguments.only or packages_of(arguments.root), Path(work))
+    noticed = Counter(mutant.package for mutant, how in zip(chosen, ran, strict=True) if not how.passed)
+    for package, count in sorted(Counter(mutant.package for mutant in chosen).items()):
+        print(f"{package:14} {noticed[package]} of {count} noticed")
     print(f"all            {noticed.total()} of {len(chosen)} noticed")
     if arguments.write:
         kept = [mutant._asdict() | how._asdict() for mutant, how in zip(chosen, ran, strict=True)]
@@ -95,8 +93,8 @@ def copy(root: Path, place: Path) -> None:
             shutil.copy2(root / name, place / name)
 
 
-def outcomes(root: Path, mutants: Sequence[Mutant], rooms: Sequence[str], work: Path) -> list[Ran]:
-    """What the tests of some rooms say of each mutant, in a copy that has them all, in `work`."""
+def outcomes(root: Path, mutants: Sequence[Mutant], packages: Sequence[str], work: Path) -> list[Ran]:
+    """What the tests of some packages say of each mutant, in a copy that has them all, in `work`."""
     place = work / "copy"
     copy(root, place)
     as_text = {mutant.file for mutant in mutants if b"njit" in (root / "apo_bench" / mutant.file).read_bytes()}
@@ -111,9 +109,9 @@ def outcomes(root: Path, mutants: Sequence[Mutant], rooms: Sequence[str], work: 
             path.write_text(switched(path.read_bytes(), numbers), encoding="utf-8")
     switch = (ROOT / "benchmarks" / "mutant_switch.py").read_bytes()
     (place / "mutant_switch.py").write_bytes(switch)
-    known = [(number, mutant.room, mutant.file in as_text) for number, mutant in enumerate(mutants, start=1)]
+    known = [(number, mutant.package, mutant.file in as_text) for number, mutant in enumerate(mutants, start=1)]
     (place / "mutants.json").write_text(json.dumps(known))
-    pytest(place, [f"tests/{room}" for room in rooms], {"MUTANT_NOTES": "1"}, None)
+    pytest(place, [f"tests/{package}" for package in packages], {"MUTANT_NOTES": "1"}, None)
     ran = []
     for line in (place / "outcomes.jsonl").read_text().splitlines():
         outcome = json.loads(line)

@@ -1,149 +1,96 @@
-"""What errors of the robot itself cost: `python benchmarks/robot_errors.py FOLDER [FOLDER ...] [--acts FILE]`.
+"""Write what errors of the robot itself cost: `python benchmarks/robot_errors.py FOLDER [FOLDER ...]`.
 
-Takes sweeps of benchmarks/robot_errors.toml, whole or not, and writes docs/results/robot-errors.md: successes of every
-robot error, method and scenario, with Wilson's 95 % interval over the scenarios. With the lines of
-`python -m benchmarks.feel_acts --out FILE` the page also says what each act of a robot that feels is worth.
+Takes sweeps of benchmarks/robot_errors.toml, whole or not, and writes docs/results/robot-errors.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.benchmark.analysis import Cell, tally, wilson
 from apo_bench.records import TrialConfig, TrialRecord
-from apo_bench.records.run.run_folder import read_rows
-from benchmarks.feel_acts import Line, lines_of, table
-from benchmarks.made_with import mujoco_of, states_of_code, with_mujoco
+from benchmarks.provenance import mujoco_of, states_of_code, with_mujoco
+from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
-OVER = """
-## Over all scenarios
-"""
-OLDER = """
-The sweeps were made with {} states of the package, so rows of different lines or scenarios may be some commits apart.
-"""
-SAID = """\
+HEAD = """\
 # Errors of the robot
 
+Contacts correct the errors of the camera, not those of the robot: with a robot error even `oracle`, which has the true
+poses, fails. A robot that [probes](../how/probing.md) estimates its own error by contacts and corrects itself.
+
 Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it.
-Success: the finished assembly is right; the same seeds in every cell, a careful human, clearance of 0.25 mm per side,
-and for `contact` and `none` a noise of 1 mm and 1 degree. A [robot
-error](../guide/arm.md#what-is-wrong-with-the-robot-itself) is drawn anew for every trial; the numbers are standard
-deviations in mm and degrees. Percentages are over all scenarios, with a 95 % interval (Wilson).
-
-## Over all scenarios
-"""
-EACH = """
-## Each scenario
-"""
-COST = """
-## What feeling costs
-
-Simulated seconds of a trial, at the median, over all errors.
-"""
-OTHERS = """
-## Other sensors, statements, arms and scenarios
-
-The sensor is that of the wrist (`--ft-sensor`), and stated is how wrong the robot was said to be (`--assumed-robot-error`).
-"""
-ACTS = """
-## Each act left out
-
-Errors of all kinds together, as in the last line of the first table, by `python -m benchmarks.feel_acts`. Without
-`touch` nothing fixed is touched, without `search` a motion that is stopped is not tried again elsewhere. Lost, won: how
-many trials only the robot with all acts got right, and how many only this one.
+Success: the finished assembly is right; the same seeds in every condition, no human error, clearance of 0.25 mm per
+side, and noise of 1 mm and 1 degree for all methods but `oracle`. Every trial draws a [robot
+error](../guide/arm.md#what-is-wrong-with-the-robot-itself); the numbers are standard deviations in mm and degrees.
+Rates over all scenarios have Wilson's 95 % intervals. The sweeps ran with {} state(s) of the package, so lines may be
+some commits apart.
 """
 SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
 USUAL = {"arm": "six_axis", "ft_sensor": TrialConfig.ft_sensor, "assumed_robot_error": TrialConfig.assumed_robot_error}
-OTHER_KEYS = ("robot_error", *USUAL)
-TAUGHT = """
-Contacts repair the eye's error, not the robot's own: with one, `oracle`, which knows the truth, fails. A robot that
-[feels](../how/feel.md) makes contacts by itself and corrects itself by them.
-"""
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("folders", nargs="+", type=Path)
-    asked.add_argument("--acts", type=Path, metavar="FILE", help="of benchmarks/feel_acts.py")
-    given = asked.parse_args()
-    folders = given.folders
-    rows = [row for folder in folders for row in read_rows(folder)]
-    acts = [] if given.acts is None else lines_of(given.acts)
-    simulated = {*mujoco_of(folders), *(line["mujoco"] for line in acts)}
-    states = states_of_code(folders)
-    said = page(rows, acts).replace(SAID, SAID.replace(OVER, OLDER.format(states) + OVER) if states > 1 else SAID)
-    PAGE.write_text(with_mujoco(said, sorted(simulated)), encoding="utf-8")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    folders = parser.parse_args().folders
+    written = page(read_judged(folders), states_of_code(folders))
+    PAGE.write_text(with_mujoco(written, mujoco_of(folders)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
-def page(every: Iterable[TrialRecord], acts: Sequence[Line] = ()) -> str:
-    every = list(every)
-    rows = [row for row in every if row["scenario"] in SCENARIOS and all(row[k] == v for k, v in USUAL.items())]
-    others = [row for row in every if row not in rows]
-    cells = [cell for cell in tally(rows) if cell.trials]
-    scenarios = sorted({cell.scenario for cell in cells})
-    methods = list(dict.fromkeys(cell.method for cell in cells))
-    errors = sorted(dict.fromkeys(cell.robot_error for cell in cells), key=_by_size)
-    pooled = [[_pooled(c for c in cells if (c.robot_error, c.method) == (e, m)) for m in methods] for e in errors]
-    columns = [(method, scenario) for method in methods for scenario in scenarios]
-    of = {(c.robot_error, c.method, c.scenario): f"{c.successes} of {c.trials}" for c in cells}
-    each = [[of.get((error, *at), "") for at in columns] for error in errors]
-    heads = [f"`{method}`, {scenario}" for method, scenario in columns]
-    cost = [
-        [_median(r["sim_time_s"] for r in rows if (r["method"], r["scenario"]) == (m, s)) for s in scenarios]
-        for m in methods
+def page(every: Sequence[TrialRecord], states: int) -> str:
+    rows = [row for row in every if _is_usual(row)]
+    methods = sorted({row["method"] for row in rows})
+    errors = sorted({str(row["robot_error"]) for row in rows}, key=_by_size)
+    whole = group(rows, lambda row: (row["robot_error"], row["method"]))
+    each = group(rows, lambda row: (row["robot_error"], row["method"], row["scenario"]))
+    times = group(rows, lambda row: (row["method"], row["scenario"]))
+    heads = [f"`{method}`" for method in methods]
+    lines = [
+        HEAD.format(states),
+        "## Over all scenarios\n",
+        *table(
+            ("robot error", *heads),
+            [[f"`{e}`", *(counted(rate_of(whole.get((e, m), []))) for m in methods)] for e in errors],
+        ),
+        "\n## Each scenario",
     ]
-    return (
-        SAID
-        + _table("robot error", [f"`{m}`" for m in methods], errors, pooled)
-        + EACH
-        + _table("robot error", heads, errors, each)
-        + COST
-        + _table("method", scenarios, methods, cost)
-        + (OTHERS + _others(others) if others else "")
-        + (ACTS + "\n" + table(acts) if acts else "")
-        + TAUGHT
-    )
+    for scenario in SCENARIOS:
+        cells = [[f"`{e}`", *(counted(rate_of(each.get((e, m, scenario), []))) for m in methods)] for e in errors]
+        lines += [f"\n### {scenario}\n", *table(("robot error", *heads), cells)]
+    cost = [[f"`{m}`", *(_median_s(times.get((m, scenario), [])) for scenario in SCENARIOS)] for m in methods]
+    lines += ["\n## Simulated seconds of a trial, median over all errors\n", *table(("method", *SCENARIOS), cost)]
+    others = group([row for row in every if not _is_usual(row)], _other_place)
+    if others:
+        lines += [
+            "\n## Other sensors, assumptions, arms and scenarios\n",
+            "The sensor is `--ft-sensor`; the assumption is `--assumed-robot-error`, what the robot takes its own "
+            "error to be.\n",
+            *table(
+                ("robot error", "arm", "sensor", "assumption", "scenario", "method", "successes"),
+                [[*(f"`{name}`" for name in place), counted(rate_of(of))] for place, of in sorted(others.items())],
+            ),
+        ]
+    return "\n".join(lines) + "\n"
 
 
-def _others(rows: Sequence[TrialRecord]) -> str:
-    """One line for each combination that is not the usual one."""
-    cells = Counter((*(row[key] for key in OTHER_KEYS), row["scenario"], row["method"]) for row in rows)
-    won = Counter((*(r[key] for key in OTHER_KEYS), r["scenario"], r["method"]) for r in rows if r["success"])
-    lines = ["| robot error | arm | sensor | stated | scenario | method | successes |", f"|{'---|' * 7}"]
-    lines += [
-        f"| {' | '.join(f'`{name}`' for name in cell)} | {won[cell]} of {cells[cell]} |" for cell in sorted(cells)
-    ]
-    return "\n" + "\n".join(lines) + "\n"
+def _is_usual(row: TrialRecord) -> bool:
+    return row["scenario"] in SCENARIOS and all(row.get(key) == value for key, value in USUAL.items())
 
 
-def _table(first: str, heads: Sequence[str], names: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    lines = [f"| {first} | {' | '.join(heads)} |", f"|---|{'---|' * len(heads)}"]
-    lines += [f"| `{name}` | {' | '.join(said)} |" for name, said in zip(names, cells, strict=True)]
-    return "\n" + "\n".join(lines) + "\n"
+def _other_place(row: TrialRecord) -> tuple[str, ...]:
+    return tuple(str(row.get(key)) for key in ("robot_error", *USUAL, "scenario", "method"))
 
 
-def _pooled(cells: Iterable[Cell]) -> str:
-    those = list(cells)
-    trials = sum(cell.trials for cell in those)
-    if not trials:
-        return ""
-    won = sum(cell.successes for cell in those)
-    low, high = wilson(won, trials)
-    return f"{won} of {trials}, {100 * won / trials:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
-
-
-def _median(seconds: Iterable[float | None]) -> str:
-    known = [s for s in seconds if s is not None]
-    return f"{median(known):.0f}" if known else ""
+def _median_s(rows: Sequence[TrialRecord]) -> str:
+    seconds = [row["sim_time_s"] for row in rows if row["sim_time_s"] is not None]
+    return f"{median(seconds):.0f}" if seconds else ""
 
 
 def _by_size(error: str) -> tuple[bool, bool, str, float]:

@@ -1,8 +1,7 @@
-"""Keep how often round and tilted parts fit: `python benchmarks/round.py FOLDER [FOLDER ...] [--half HALF ...]`.
+"""Write how often round and tilted parts fit: `python benchmarks/round.py FOLDER [FOLDER ...] [--half HALF ...]`.
 
 Takes sweeps of benchmarks/round.toml and gearbox.toml, whole or not, and of the same with half the time step; writes
-results/round.csv, one line for each cell, and docs/results/round.md: success with Wilson's 95 % intervals, contacts
-that were recognised, and how many verdicts half the step changes.
+results/round.csv, one line for each condition, and docs/results/round.md.
 """
 
 from __future__ import annotations
@@ -10,247 +9,179 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.benchmark.analysis import wilson
+from apo_bench.benchmark.analysis import Rate
 from apo_bench.records import TrialRecord
-from apo_bench.records.run.run_folder import read_rows
-from benchmarks.asked import ROUND, block
-from benchmarks.made_with import mujoco_of, with_mujoco
+from benchmarks.provenance import mujoco_of, share_of_sweep, with_mujoco
+from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "round.csv"
 PAGE = ROOT / "docs" / "results" / "round.md"
-METHODS = ("oracle", "uncorrected", "spiral-search", "nominal", "snap", "snap+spiral", "paper", "contact")
+SWEEPS = (ROOT / "benchmarks" / "round.toml", ROOT / "benchmarks" / "gearbox.toml")
+METHODS = ("uncorrected", "spiral-search", "nominal", "snap", "snap+spiral", "paper", "contact")
 CHAINED = ("uncorrected", "spiral-search", "paper", "contact")
-"""Methods of the table of one long chain."""
-PLAY = ("oracle", "uncorrected", "spiral-search", "contact")
-"""Methods of the table of less play."""
-DETECTED = "detected"
-CHAIN = "gearbox"
-"""Ten operations, one on the other."""
-LEVELS = (0.0, 1.0, 2.0)
-"""Of every method; the levels between are in a table of their own."""
-SHOWN = "0.25"
-"""Play of the scenarios, in mm."""
+TIGHTER = ("oracle", "uncorrected", "spiral-search", "contact")
+CHAIN = "gearbox"  # ten operations, one on the other
+CLEARANCE_MM = 0.25  # of the scenarios
 
 
 class Place(NamedTuple):
-    """One cell."""
+    """A condition."""
 
     scenario: str
     clearance_mm: float
     human_error_scale: float
-    noise_level: float
+    noise_mm: float
     contact_source: str
     method: str
 
 
-class Cell(NamedTuple):
-    trials: int
-    successes: int
-    all_contacts_right: int | None
-    error_mm: float
-    """Median of how far corners of parts were planned wrong, along what contacts fix."""
-
-
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("folders", nargs="+", type=Path)
-    asked.add_argument("--half", nargs="*", default=[], type=Path, help="sweeps with half the time step")
-    given = asked.parse_args()
-    rows = judged(given.folders)
-    half = judged(given.half)
-    cells = {place: cell_of(each) for place, each in grouped(rows).items()}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--half", nargs="*", default=[], type=Path, help="sweeps with half the time step")
+    given = parser.parse_args()
+    found = group(read_judged(given.folders), place_of)
     with KEPT.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*Place._fields, *Cell._fields])
-        writer.writerows([*place, *cell] for place, cell in sorted(cells.items()))
-    written = "\n".join(page(cells, rows, half)) + "\n"
+        writer.writerow([*Place._fields, "trials", "successes", "all_contacts_right", "error_mm"])
+        for place, rows in sorted(found.items()):
+            rate = rate_of(rows)
+            writer.writerow(
+                [*place, rate.trials, rate.successes, _detected(rows), _middle(rows, "planned_error_fixed_mm")]
+            )
+    written = "\n".join(page(found, read_judged(given.half))) + "\n"
     PAGE.write_text(with_mujoco(written, mujoco_of([*given.folders, *given.half])), encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
 
-def judged(folders: Iterable[Path]) -> list[TrialRecord]:
-    """Rows with a verdict, each trial once."""
-    rows = {(place_of(row), row["seed"]): row for folder in folders for row in read_rows(folder)}
-    return [row for row in rows.values() if row["success"] is not None]
-
-
-def grouped(rows: Iterable[TrialRecord]) -> dict[Place, list[TrialRecord]]:
-    found: dict[Place, list[TrialRecord]] = defaultdict(list)
-    for row in rows:
-        found[place_of(row)].append(row)
-    return found
-
-
 def place_of(row: TrialRecord) -> Place:
-    numbers = (float(row[name] or 0.0) for name in ("clearance_mm", "human_error_scale", "noise_mm"))  # type: ignore[literal-required]
-    return Place(str(row["scenario"]), *numbers, str(row["contact_source"]), str(row["method"]))
+    """Return the condition of a trial."""
+    human_error_scale, noise_mm = (float(row[name] or 0.0) for name in ("human_error_scale", "noise_mm"))  # type: ignore[literal-required]
+    source, method = str(row["contact_source"]), str(row["method"])
+    return Place(str(row["scenario"]), float(row["clearance_mm"]), human_error_scale, noise_mm, source, method)
 
 
-def cell_of(rows: list[TrialRecord]) -> Cell:
-    errors = [row["planned_error_fixed_mm"] for row in rows if row["planned_error_fixed_mm"] is not None]
-    right = None
-    if rows[0]["contact_source"] == DETECTED:
-        right = sum(row["contacts_false_negative"] == 0 and row["contacts_false_positive"] == 0 for row in rows)
-    return Cell(len(rows), sum(bool(row["success"]) for row in rows), right, round(median(errors or [0.0]), 3))
-
-
-def page(cells: Mapping[Place, Cell], rows: list[TrialRecord], half: list[TrialRecord]) -> list[str]:
+def page(found: Mapping[Place, Sequence[TrialRecord]], half: Iterable[TrialRecord]) -> list[str]:
+    trials = sum(map(len, found.values()))
     return [
         "# Round and tilted faces",
         "",
-        "Written by `python benchmarks/round.py` from sweeps of `benchmarks/round.toml` and `gearbox.toml`; counts in "
-        "`benchmarks/results/round.csv`. Success: the finished assembly is right; Wilson's 95 % intervals; friction "
-        "grasp, the same seeds for every method. A level of L is a standard deviation of L mm and L degrees per axis. "
-        "`oracle` is told the true poses, so that neither human nor level changes what it does. Planned wrong by: how "
-        "far, in the median, `none` and `contact` planned parts from where they belong, along what contacts fix.",
+        "Written by `python benchmarks/round.py` from sweeps of `benchmarks/round.toml` and `gearbox.toml`; the counts "
+        "are in `benchmarks/results/round.csv`. Success: the finished assembly is right; Wilson's 95 % intervals; "
+        "friction grasp, the same seeds for every method. Noise is a standard deviation per axis in mm and in degrees. "
+        "`oracle` has the true poses, so neither human error nor noise changes it. Planned error: how far, in the "
+        "median, `uncorrected` and `contact` planned parts from their true places, in directions contacts fix. "
+        f"{share_of_sweep(trials, *SWEEPS)}",
         "",
-        block(ROUND),
+        f"## Success at a clearance of {CLEARANCE_MM} mm",
         "",
-        f"## Success at a play of {SHOWN} mm",
+        *table(("scenario", "human error", "noise", *(f"`{m}`" for m in METHODS), "planned error, mm"), success(found)),
         "",
-        *success_table(cells),
+        "## Less clearance",
         "",
-        "## Less play",
+        *table(("scenario", "clearance, mm", "noise", *(f"`{m}`" for m in TIGHTER)), tighter(found)),
         "",
-        *play_table(cells),
+        "## Detected contacts",
         "",
-        "## Contacts found in the seen poses",
+        "At 0.5 mm and degrees, `--contact-source detected`: trials in which exactly the true contacts were detected, "
+        "and success of `contact` with the detected ones.",
         "",
-        "At level 0.5, `--contact-source detected`: trials in which every contact was found and no other, and success of "
-        "`contact` with what was found.",
+        *table(("scenario", "human error", "every contact right", "success"), detected(found)),
         "",
-        *recognition_table(cells),
+        f"## Errors along the ten operations of {CHAIN}",
         "",
-        f"## {CHAIN}: what ten operations do to errors",
+        "No human error. In mm, in the median: how far corners of parts were planned from their true places in "
+        "directions that contacts fix; and how far off `contact` left parts, in fixed directions and in free ones, "
+        "such as where on the table the base stands. The last column is the operation at which `uncorrected` fails "
+        "(median).",
         "",
-        "A careful human. In mm, in the median: how far corners of parts were planned from where they belong, along "
-        "what contacts fix; and how far off `contact` left parts, along what contacts fix and along what they leave "
-        "free, such as where on the table the base stands. Last, the operation at which `none` fails (median).",
-        "",
-        *chain_table(rows),
+        *table(
+            (
+                *("noise", *(f"`{m}`" for m in CHAINED)),
+                *("planned: `uncorrected`", "`paper`", "`contact`"),
+                *("left off: fixed", "free", "`uncorrected` fails at"),
+            ),
+            chain(found),
+        ),
         "",
         "## Half the time step",
         "",
         "The same trials with 1 ms and with 0.5 ms, seed by seed.",
         "",
-        *half_table(rows, half),
+        *table(("scenario", "trials", "verdicts that differ"), half_step(found, half)),
     ]
 
 
-def success_table(cells: Mapping[Place, Cell]) -> list[str]:
-    plain = {p: c for p, c in cells.items() if p.clearance_mm == float(SHOWN) and p.contact_source == "given"}
-    lines = sorted({(p.scenario, p.human_error_scale, p.noise_level) for p in plain if p.method != "oracle"})
-    lines = [line for line in lines if line[0] != CHAIN or line[2] in LEVELS]
-    made = [
-        f"| scenario | human | level | {' | '.join(f'`{m}`' for m in METHODS[1:])} | planned wrong by, mm |",
-        "|---|" + "---|" * (len(METHODS) + 2),
-    ]
-    for scenario in sorted({p.scenario for p in plain}):
-        told = [c for p, c in plain.items() if p.scenario == scenario and p.method == "oracle"]
-        made.append(f"| {scenario} | `oracle` | | {rate(sum_of(told))}{' |' * len(METHODS)}")
-        for _, human_error_scale, noise_level in (line for line in lines if line[0] == scenario):
-            each = {
-                m: plain.get(Place(scenario, float(SHOWN), human_error_scale, noise_level, "given", m)) for m in METHODS
-            }
-            said = " | ".join(rate(each[m]) for m in METHODS[1:])
-            wrong = ", ".join(f"{found.error_mm:.2f}" for m in ("uncorrected", "contact") if (found := each[m]))
-            made.append(f"| {scenario} | {human(human_error_scale)} | {noise_level:g} | {said} | {wrong} |")
-    return made
+def success(found: Mapping[Place, Sequence[TrialRecord]]) -> Iterator[list[object]]:
+    plain = {p: rows for p, rows in found.items() if (p.clearance_mm, p.contact_source) == (CLEARANCE_MM, "given")}
+    for scenario in sorted({place.scenario for place in plain}):
+        told = [row for p, rows in plain.items() if (p.scenario, p.method) == (scenario, "oracle") for row in rows]
+        yield [scenario, "", "`oracle`", counted(rate_of(told)), *[""] * len(METHODS)]
+        for scale, noise in sorted({p[2:4] for p in plain if p.scenario == scenario and p.method != "oracle"}):
+            own = {m: plain.get(Place(scenario, CLEARANCE_MM, scale, noise, "given", m), ()) for m in METHODS}
+            errors = [_middle(own[m], "planned_error_fixed_mm") for m in ("uncorrected", "contact") if own[m]]
+            rates = [counted(rate_of(own[m])) for m in METHODS]
+            yield [scenario, f"{scale:g}", f"{noise:g}", *rates, ", ".join(errors)]
 
 
-def play_table(cells: Mapping[Place, Cell]) -> list[str]:
-    made = [
-        "| scenario | play, mm | level | `oracle` | `none` | `search` | `contact` |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    less = {p: c for p, c in cells.items() if p.clearance_mm < float(SHOWN) and p.contact_source == "given"}
-    for scenario, play, noise_level in sorted({(p.scenario, p.clearance_mm, p.noise_level) for p in less}):
-        each = (Place(scenario, play, 0.0, noise_level, "given", method) for method in PLAY)
-        made.append(
-            f"| {scenario} | {play:g} | {noise_level:g} | {' | '.join(rate(less.get(place)) for place in each)} |"
-        )
-    return made
+def tighter(found: Mapping[Place, Sequence[TrialRecord]]) -> Iterator[list[object]]:
+    less = {p: rows for p, rows in found.items() if p.clearance_mm < CLEARANCE_MM and p.contact_source == "given"}
+    for scenario, clearance_mm, noise in sorted({(p.scenario, p.clearance_mm, p.noise_mm) for p in less}):
+        own = [less.get(Place(scenario, clearance_mm, 0.0, noise, "given", method), ()) for method in TIGHTER]
+        yield [scenario, f"{clearance_mm:g}", f"{noise:g}", *(counted(rate_of(rows)) for rows in own)]
 
 
-def recognition_table(cells: Mapping[Place, Cell]) -> list[str]:
-    made = ["| scenario | human | every contact right | success |", "|---|---|---|---|"]
-    for place, cell in sorted(cells.items()):
-        if cell.all_contacts_right is not None:
-            right = rate(Cell(cell.trials, cell.all_contacts_right, None, 0.0))
-            made.append(f"| {place.scenario} | {human(place.human_error_scale)} | {right} | {rate(cell)} |")
-    return made
+def detected(found: Mapping[Place, Sequence[TrialRecord]]) -> Iterator[list[object]]:
+    for place, rows in sorted(found.items()):
+        right = _detected(rows)
+        if right is not None:
+            exact = counted(Rate(right, len(rows)))
+            yield [place.scenario, f"{place.human_error_scale:g}", exact, counted(rate_of(rows))]
 
 
-def chain_table(rows: Iterable[TrialRecord]) -> list[str]:
-    made = [
-        "| level | `none` | `search` | `paper` | `contact` | planned: `none` | `paper` | `contact` | left off: fixed "
-        "| free | `none` fails at |",
-        "|---|" + "---|" * 10,
-    ]
-    mine = [
-        row
-        for row in rows
-        if (row["scenario"], row["human_error_scale"], row["contact_source"]) == (CHAIN, 0.0, "given")
-    ]
-    for noise_level in sorted({float(row["noise_mm"] or 0.0) for row in mine}):
-        of = {m: [row for row in mine if row["method"] == m and row["noise_mm"] == noise_level] for m in CHAINED}
+def chain(found: Mapping[Place, Sequence[TrialRecord]]) -> Iterator[list[object]]:
+    mine = {
+        (p.noise_mm, p.method): rows
+        for p, rows in found.items()
+        if (p.scenario, p.human_error_scale, p.contact_source) == (CHAIN, 0.0, "given")
+    }
+    for noise in sorted({noise for noise, _ in mine}):
+        of = {method: mine.get((noise, method), ()) for method in CHAINED}
         if all(of.values()):
-            planned = [
-                middle(row["planned_error_fixed_mm"] for row in of[m]) for m in ("uncorrected", "paper", "contact")
-            ]
-            ends = [
-                middle(row[name] for row in of["contact"]) for name in ("pose_error_fixed_mm", "pose_error_free_mm")
-            ]
-            failed = [row["failure_operation"] for row in of["uncorrected"] if not row["success"]]
-            said = [f"{noise_level:g}", *(rate(cell_of(of[m])) for m in CHAINED), *planned, *ends, middle(failed, 0)]
-            made.append(f"| {' | '.join(said)} |")
-    return made
+            planned = [_middle(of[m], "planned_error_fixed_mm") for m in ("uncorrected", "paper", "contact")]
+            left = [_middle(of["contact"], name) for name in ("pose_error_fixed_mm", "pose_error_free_mm")]
+            failed = [row for row in of["uncorrected"] if not row["success"]]
+            rates = [counted(rate_of(of[m])) for m in CHAINED]
+            yield [f"{noise:g}", *rates, *planned, *left, _middle(failed, "failure_operation", 0)]
 
 
-def middle(numbers: Iterable[float | None], digits: int = 2) -> str:
-    told = [number for number in numbers if number is not None]
-    return f"{median(told):.{digits}f}" if told else ""
+def half_step(found: Mapping[Place, Sequence[TrialRecord]], half: Iterable[TrialRecord]) -> Iterator[list[object]]:
+    ends = {(place, row["seed"]): row["success"] for place, rows in found.items() for row in rows}
+    both = [row for row in half if (place_of(row), row["seed"]) in ends]
+    for name, rows in {**group(both, lambda row: row["scenario"]), "all": both}.items():
+        differing = sum(row["success"] != ends[place_of(row), row["seed"]] for row in rows)
+        yield [name, len(rows), f"{differing} ({100 * differing / max(1, len(rows)):.1f} %)"]
 
 
-def half_table(rows: list[TrialRecord], half: list[TrialRecord]) -> list[str]:
-    ends = {(place_of(row), row["seed"]): bool(row["success"]) for row in rows}
-    pairs: dict[str, list[bool]] = defaultdict(list)
-    for row in half:
-        if (key := (place_of(row), row["seed"])) in ends:
-            pairs[key[0].scenario].append(ends[key] != bool(row["success"]))
-    pairs["all"] = [differs for each in pairs.values() for differs in each]
-    return [
-        "| scenario | trials | verdicts that differ |",
-        "|---|---|---|",
-        *(
-            f"| {name} | {len(each)} | {sum(each)} ({100 * sum(each) / max(1, len(each)):.1f} %) |"
-            for name, each in pairs.items()
-        ),
-    ]
+def _detected(rows: Sequence[TrialRecord]) -> int | None:
+    """Count trials with exactly the true contacts; None where contacts are given."""
+    if rows[0]["contact_source"] != "detected":
+        return None
+    return sum(row["contacts_false_negative"] == 0 and row["contacts_false_positive"] == 0 for row in rows)
 
 
-def sum_of(cells: list[Cell]) -> Cell | None:
-    return Cell(sum(c.trials for c in cells), sum(c.successes for c in cells), None, 0.0) if cells else None
-
-
-def rate(cell: Cell | None) -> str:
-    if cell is None:
-        return ""
-    low, high = wilson(cell.successes, cell.trials)
-    return f"{cell.successes} of {cell.trials} ({100 * low:.0f} to {100 * high:.0f} %)"
-
-
-def human(human_error_scale: float) -> str:
-    return "human_error_scale" if human_error_scale else "careful"
+def _middle(rows: Iterable[TrialRecord], column: str, digits: int = 2) -> str:
+    """Return the median of a column; nothing where no trial has it."""
+    numbers = [row[column] for row in rows if row[column] is not None]  # type: ignore[literal-required]
+    return f"{median(numbers):.{digits}f}" if numbers else ""
 
 
 if __name__ == "__main__":

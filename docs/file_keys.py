@@ -1,33 +1,24 @@
 """The page of every key in scenario, part, noise, arm and sweep files, read from the program itself.
 
-Tables of scenarios and parts are types whose fields are their keys; readers of other files are listened to while they
-read the files of the package and the example of the guide. What a key means stands here; a key without a meaning, or a
+The tables of a file are types whose fields are their keys. What a key means stands here; a key without a meaning, or a
 meaning without a key, is an error. Arms are a dataclass.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import re
 import sys
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
-from unittest.mock import patch
 
 import msgspec
-import numpy as np
 from fields import sentences
 
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED
-from apo_bench.benchmark.sweeps.sweep_file import read_sweep
+from apo_bench.benchmark.sweeps.sweep_file import SweepTable
 from apo_bench.cli.setting_options import shown_default
 from apo_bench.importers.assembly.writing import THRESHOLDS
-from apo_bench.io import JsonNode
-from apo_bench.perception.observation.models.fitted import ConstantError, ViewNoise
-from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
+from apo_bench.perception.observation import noise_file
 from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario import tables as scenario_tables
 from apo_bench.scenario.parts import stated
@@ -53,14 +44,21 @@ SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
 
 
 def sweep_meanings() -> dict[str, str]:
-    """Key of a sweep file -> what it means, of the settings of a trial."""
-    axes = {info.axis: (info, "a list") for info in AXES if info.axis != "scenarios"}
-    shared = {SETTINGS[name].keyword: (SETTINGS[name], "one for the whole sweep") for name in SHARED}
-    return {key: f"{info.help}: {how}; else {default_of(info)}" for key, (info, how) in {**axes, **shared}.items()}
+    """Return what each setting of a trial means as a key of a sweep file."""
+    several = [*AXES, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]
+    meanings = {
+        info.name: f"{info.help}: one value or several; default {default_of(info)}"
+        for info in several
+        if info.name != "scenario"
+    }
+    for name in SHARED:
+        info = SETTINGS[name]
+        meanings[info.keyword] = f"{info.help}: one value for the whole sweep; default {default_of(info)}"
+    return meanings
 
 
 def default_of(info: SettingInfo) -> str:
-    """What a sweep has where nothing is said."""
+    """Return the default of a sweep in words."""
     return ", ".join(f"`{value:g}`" if isinstance(value, float) else f"`{value}`" for value in info.swept) or (
         info.usual or f"`{shown_default(info)}`"
     )
@@ -79,7 +77,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "parts": "one table per part: `[parts.NAME]`",
             "operations": "one table per operation, in order: `[[operations]]`",
             "site": "where the assembly stands; else at the origin of the table",
-            "human_error_scale": "the error of the person; else there is none",
+            "human_error": "the error of the person; else there is none",
             "judge": "thresholds of the verdict",
         },
         "parts.NAME": {
@@ -128,7 +126,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "spread_mm": "how far from it in x and y, to either side",
             "yaw_deg": "lowest and highest turn about the vertical",
         },
-        "human_error_scale": {
+        "human_error": {
             "operation": "number of the operation that goes wrong, from 1",
             "along": f"direction of the error, level at the goal; {SHIFT}",
             "size_mm": "lowest and highest size, to either side; `human_error_scale` of a trial scales it",
@@ -148,8 +146,6 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "shift": "errors of the position",
             "turn": "errors of the turn",
             "camera": "pose of the camera in the world, `{ at_mm, turn_deg }`; else the default one",
-            "view": "one error for each demonstration that all operations share; else there is none",
-            "constant": "an error that stays, which `correct --camera-noise` takes out; else there is none",
         },
         "shift": {
             "limit_mm": "no error of an inlier is longer",
@@ -164,16 +160,6 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "across_degrees_of_freedom": "its degrees of freedom, `inf` for a Gaussian",
             "along_scale_deg": "scale of the Student t of turns about the ray",
             "along_degrees_of_freedom": "its degrees of freedom",
-        },
-        "view": {
-            "shift_mm": "standard deviation per axis, 0 to 200",
-            "turn_deg": "standard deviation per axis, about the middle of what is seen, 0 to 45",
-        },
-        "constant": {
-            "shift_mm": "how far everything is seen displaced, three numbers",
-            "turn_deg": "and turned, a rotation vector",
-            "position_mm": "the frame of both in the world: its origin",
-            "quaternion_wxyz": "and its axes",
         },
     },
     "Files beside parts": {
@@ -212,7 +198,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     },
     "Sweep files": {
         "": {
-            "scenarios": "names, or scenario files",
+            "scenario": "name or scenario file: one or several",
             **sweep_meanings(),
             "trials": "seeds per cell, 1 to 1000000; else 100",
             "seed": "the first seed; else 0",
@@ -265,7 +251,7 @@ def scenario_keys() -> Keys:
         "operations, grasp": scenario_tables.GraspTable,
         "operations, vary": scenario_tables.VaryTable,
         "site": scenario_tables.SiteTable,
-        "human_error_scale": scenario_tables.HumanErrorTable,
+        "human_error": scenario_tables.HumanErrorTable,
         "judge": scenario_tables.JudgeTable,
     }
     return {table: keys_of(of) for table, of in types.items()}
@@ -293,56 +279,12 @@ def keys_of(table: type[msgspec.Struct]) -> tuple[frozenset[str], frozenset[str]
 
 
 def noise_keys() -> Keys:
-    with listening() as heard:
-        for path in presets().values():
-            measured, _ = read_noise(path)
-        with tempfile.TemporaryDirectory() as folder:
-            own = Path(folder) / "own.toml"
-            still = ConstantError(np.zeros(6), np.eye(4))
-            own.write_text(noise_text(replace(measured, view=ViewNoise(1.0, 1.0), constant=still)), encoding="utf-8")
-            read_noise(own)
-    return named(heard, lambda key: key)
+    types = {"": noise_file.NoiseTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable}
+    return {table: keys_of(of) for table, of in types.items()}
 
 
 def sweep_keys() -> Keys:
-    with listening() as heard, tempfile.TemporaryDirectory() as folder:
-        mine = Path(folder) / "mine.toml"
-        mine.write_text(example(EXAMPLE, "mine.toml"), encoding="utf-8")
-        read_sweep(mine)
-    return named(heard, lambda key: "" if not key else None)
-
-
-def example(guide: Path, name: str) -> str:
-    """The example of a guide that has this title."""
-    found = re.search(rf'^```toml title="{re.escape(name)}"\n(.*?)^```', guide.read_text(encoding="utf-8"), re.M | re.S)
-    assert found is not None, f"{guide} has no example '{name}'"
-    return found.group(1)
-
-
-@contextmanager
-def listening() -> Iterator[list[tuple[str, tuple[str, ...], tuple[str, ...]]]]:
-    """Which keys readers ask of which place in a file, while they read."""
-    heard: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = []
-    fields = JsonNode.fields
-
-    def listened(self: JsonNode, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
-        heard.append((self.key, tuple(required), tuple(optional)))
-        return fields(self, required, optional)
-
-    with patch.object(JsonNode, "fields", listened):
-        yield heard
-
-
-def named(heard: Iterable[tuple[str, tuple[str, ...], tuple[str, ...]]], table_of: object) -> Keys:
-    """The keys of each table; of one with several forms all of them, and as needed what every form needs."""
-    assert callable(table_of)
-    tables: Keys = {}
-    for key, required, optional in heard:
-        table = table_of(key)
-        if table is not None:
-            needed, allowed = tables.get(table, (frozenset(required), frozenset[str]()))
-            tables[table] = needed & set(required), allowed.union(required, optional)
-    return tables
+    return {"": keys_of(SweepTable)}
 
 
 PART_LINES = """

@@ -1,5 +1,4 @@
-"""Draw the picture at the top, what is believed, and two pictures of films: `python docs/pictures.py` (half a minute,
-no display needed)."""
+"""Draw the picture at the top, pose estimates and two pictures of films: `python docs/pictures.py` (half a minute)."""
 
 from __future__ import annotations
 
@@ -40,7 +39,7 @@ def main() -> None:
     ]
     draw_top(shots, HERE / "top.png")
     beliefs = [belief_panel("as seen", seen, seen.poses, 3), belief_panel("corrected by contact", seen, corrected, 3)]
-    draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
+    draw_beliefs(scene.scenario, 3, beliefs, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")
 
@@ -49,8 +48,8 @@ def draw_film(method: str, path: Path) -> None:
     """One picture of the film of a replay: how it ended where it failed, else the stick on its way in."""
 
     def keep(rollout: Rollout) -> None:
-        replayed = rollout.chapters[-1]
-        inside = [m for m in replayed.moments if m.doing.operation == 2 and m.doing.macro.startswith("insert")]
+        replayed = rollout.segments[-1]
+        inside = [m for m in replayed.moments if m.phase.operation == 2 and m.phase.macro.startswith("insert")]
         shown = replayed.moments if method == "uncorrected" else inside[: 3 * len(inside) // 4]
         *_, ended = pictures = [
             picture

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.geometry import pose
-from tests.audited_states import HALF_Y, HALF_Z, Seen
-from tests.end_states import END, moved, put, shift
+from tests.audited_states import HALF_Y, Seen
+from tests.end_states import moved, put, shift
 from tests.rounds import (
     countersink,
     dovetail,
@@ -22,25 +22,14 @@ from tests.rounds import (
 from tests.scenes import mm
 
 PEGS = [
-    Seen("peg, exactly", peg_in_plate, [], True),
     Seen("peg, turned by 30 degrees about its axis", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0, 0, 30))], True),
-    Seen("peg, upside down", peg_in_plate, [put("peg", 2, mm(0, 0, 50, (180, 0, 0)))], True),
     Seen("peg, 0.34 mm aside", peg_in_plate, [shift("peg", 2, 0.34, 0, 0)], True),
     Seen("peg, 0.36 mm aside", peg_in_plate, [shift("peg", 2, 0, -0.36, 0)], False),
-    Seen("peg, 0.3 mm aside both ways", peg_in_plate, [shift("peg", 2, 0.3, -0.3, 0)], False),
     Seen("peg, leans by 0.9 degrees", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0.9, 0, 0))], True),
     Seen("peg, leans by 1.1 degrees", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0, 1.1, 0))], False),
-    Seen("peg, on top of the plate", peg_in_plate, [shift("peg", 2, 8, 0, 20)], False),
-    Seen("peg, the plate turned by 30 degrees about it", peg_in_plate, [shift("plate", 1, 0, 0, 0, (0, 0, 30))], True),
     Seen("peg, plate and peg pushed by 1.1 mm at the insertion", peg_in_plate, [moved(2, mm(1.1, 0, 0))], True),
     Seen("thin peg, 0.19 mm aside where its size leaves 0.1", loose_peg, [shift("peg", 2, 0.19, 0, 0)], True),
     Seen("thin peg, 0.21 mm aside where its size leaves 0.1", loose_peg, [shift("peg", 2, 0.21, 0, 0)], False),
-    Seen(
-        "bush, it and the peg in it turned each by its own",
-        nested,
-        [shift("bush", 2, 0, 0, 0, (0, 0, 50)), shift("peg", 3, 0, 0, 0, (0, 0, -20))],
-        True,
-    ),
     Seen(
         "bush, 0.3 mm aside, the peg 0.3 mm aside in it",
         nested,
@@ -52,34 +41,23 @@ PEGS = [
 """Pegs that stand in holes."""
 
 SHAFTS = [
-    Seen("shaft, exactly through both plates", through, [], True),
-    Seen("shaft, turned by 77 degrees about its axis", through, [shift("peg", 3, 0, 0, 0, (0, 0, 77))], True),
     Seen("shaft, 55 % of the second bore filled", through, [shift("peg", 3, 0, 0, 29)], True),
     Seen("shaft, 45 % of the second bore filled", through, [shift("peg", 3, 0, 0, 31)], False),
-    Seen("shaft, the second plate turned by 0.9 degrees", through, [shift("b", 2, 0, 0, 0, (0, 0.9, 0))], True),
-    Seen("shaft, the second plate turned by 1.5 degrees", through, [shift("b", 2, 0, 0, 0, (0, 1.5, 0))], False),
     Seen("shaft, skew by 0.15 degrees", through, [shift("peg", 3, 0, 0, 0, (0, 0.15, 0))], True),
     Seen("shaft, skew by 0.3 degrees", through, [shift("peg", 3, 0, 0, 0, (0, 0.3, 0))], False),
-    Seen(
-        "groove, the shaft rolled by 50 degrees about its axis", in_groove, [shift("peg", 2, 0, 0, 0, (0, 0, 50))], True
-    ),
     Seen("groove, the shaft 26 mm along it, 39 of 50 mm in it", in_groove, [shift("peg", 2, 0, 0, 26)], True),
     Seen("groove, the shaft 0.12 mm up, 0.085 mm off both walls", in_groove, [shift("peg", 2, -0.12, 0, 0)], True),
     Seen("groove, the shaft 0.16 mm up, 0.113 mm off both walls", in_groove, [shift("peg", 2, -0.16, 0, 0)], False),
     Seen("lying shaft, 0.09 mm above the table", on_table, [shift("peg", 1, -0.09, 0, 0)], True),
     Seen("lying shaft, 0.11 mm above the table", on_table, [shift("peg", 1, -0.11, 0, 0)], False),
-    Seen("lying shaft, rolls by 5 mm at the end", on_table, [moved(END, mm(0, 5, 0))], True),
     Seen("lying shaft, 26 of 50 mm on the table", on_table, [put("peg", 1, mm(674, 0, 5, (0, 90, 0)))], True),
     Seen("lying shaft, 24 of 50 mm on the table", on_table, [put("peg", 1, mm(676, 0, 5, (0, 90, 0)))], False),
 ]
 """Shafts that lie, and shafts through two parts."""
 
 CONES = [
-    Seen("plug, turned by 100 degrees about its axis", countersink, [shift("plug", 2, 0, 0, 0, (0, 0, 100))], True),
     Seen("plug, 0.12 mm high, 0.085 mm off the wall", countersink, [shift("plug", 2, 0, 0, 0.12)], True),
     Seen("plug, 0.16 mm high, 0.113 mm off the wall", countersink, [shift("plug", 2, 0, 0, 0.16)], False),
-    Seen("plug, tilted by 0.5 degrees", countersink, [shift("plug", 2, 0, 0, 0, (0.5, 0, 0))], True),
-    Seen("plug, tilted by 1.5 degrees", countersink, [shift("plug", 2, 0, 0, 0, (1.5, 0, 0))], False),
     Seen(
         "rim, the plug tilted by 3 degrees on it",
         on_rim,
@@ -105,15 +83,9 @@ ABOUT = MIDDLE @ pose.exp([0, 0, 0, *np.radians(3.0) * OUT]) @ pose.inverse(MIDD
 TOP = 20.0 + 60.0 * np.tan(SLOPE)
 
 TILTED = [
-    Seen("wedges, the upper one slid by 40 of 69 mm", wedges_meet, [moved(2, mm(*(40 * DOWN)), "high")], False),
     Seen("wedges, 0.09 mm apart", wedges_meet, [moved(2, mm(*(0.09 * OUT)), "high")], True),
     Seen("wedges, 0.11 mm apart", wedges_meet, [moved(2, mm(*(0.11 * OUT)), "high")], False),
-    Seen(
-        "wedges, the upper one 0.11 mm higher, so 0.095 mm apart", wedges_meet, [moved(2, mm(0, 0, 0.11), "high")], True
-    ),
-    Seen("wedges, the upper one turned by 3 degrees on the slope", wedges_meet, [moved(2, ABOUT, "high")], True),
     Seen("wedges, the upper one turned by half a turn", wedges_meet, [put("high", 2, mm(0, 0, TOP, HALF_Y))], False),
-    Seen("dovetail, the slider by half a turn", dovetail, [shift("slider", 2, 0, 0, 0, HALF_Z)], True),
     Seen("dovetail, 31 mm along, 49 of 60 mm on the rail", dovetail, [shift("slider", 2, -31, 0, 0)], True),
     Seen("dovetail, 0.4 mm aside, 0.346 mm off the walls", dovetail, [shift("slider", 2, 0, 0.4, 0)], True),
     Seen("dovetail, 0.42 mm aside, 0.364 mm off the walls", dovetail, [shift("slider", 2, 0, 0.42, 0)], False),

@@ -126,26 +126,7 @@ IN_B = mm(60, 150, 19)
 TURNED = [
     Seen("tower, the stick turned by a quarter about its length", TOWER, [shift("stick", 3, 0, 0, 0, QUARTER_X)], True),
     Seen(
-        "tower, every part turned by half a turn of its own",
-        TOWER,
-        [
-            shift("castle1", 1, 0, 0, 0, HALF_Z),
-            shift("castle2", 2, 0, 0, 0, HALF_Z),
-            shift("stick", 3, 0, 0, 0, HALF_X),
-        ],
-        True,
-    ),
-    Seen(
         "tower, castle 1 turned by a quarter, its slot across", TOWER, [shift("castle1", 1, 0, 0, 0, QUARTER_Z)], False
-    ),
-    Seen(
-        "castles, the stick on its edge, turned by 45 degrees", CASTLES, [shift("stick", 3, 0, 0, 0, (45, 0, 0))], False
-    ),
-    Seen(
-        "carried stick, the cube turned by a quarter about its hole",
-        CARRIED,
-        [shift("cube", 3, 0, 0, 0, QUARTER_X)],
-        True,
     ),
     Seen(
         "carried stick, the cube turned by a quarter, its hole across",
@@ -154,17 +135,6 @@ TURNED = [
         False,
     ),
     Seen("bridge, A lies along the seam, turned by 80 degrees", BRIDGE, [shift("A", 3, 0, 0, 0, (0, 0, 80))], False),
-    Seen(
-        "pockets, each cube and the stick turned by a quarter of its own",
-        POCKETS,
-        [
-            shift("cube2", 2, 0, 0, 0, QUARTER_X),
-            shift("cube3", 3, 0, 0, 0, (-90, 0, 0)),
-            shift("stick", 5, 0, 0, 0, HALF_Z),
-        ],
-        True,
-    ),
-    Seen("pockets, cube 2 turned by a quarter in its pocket", POCKETS, [shift("cube2", 6, 0, 0, 0, QUARTER_Z)], False),
     Seen(
         "narrow stick, turned so that its fit side stays at its wall",
         narrow_stick,
@@ -200,13 +170,11 @@ ELSEWHERE = [
         "bridge, B and C in each other's place", BRIDGE, [put("B", 1, mm(25, 0, 25)), put("C", 2, mm(-25, 0, 25))], True
     ),
     Seen("pockets, the cubes in each other's pocket", POCKETS, [put("cube2", 6, IN_B), put("cube3", 6, IN_A)], True),
-    Seen("pockets, all one pocket too far", POCKETS, [moved(6, mm(120, 0, 0), *GROUP)], False),
 ]
 """Right or wrong in itself, at another place."""
 
 AFTERWARDS = [
     Seen("tower, all of it turned by 5 degrees at the end", TOWER, [moved(END, mm(0, 0, 0, (0, 0, 5)))], True),
-    Seen("tower, all of it pushed by 1.1 mm at the end", TOWER, [moved(END, mm(0.7, 0.86, 0))], True),
     Seen("tower, the stick turned by 0.6 degrees at the end", TOWER, [shift("stick", END, 0, 0, 0, (0, 0, 0.6))], True),
     Seen(
         "castles, the stick turned by 0.4 degrees into the walls",
@@ -214,31 +182,16 @@ AFTERWARDS = [
         [shift("stick", END, 0, 0, 0, (0, 0, 0.4))],
         False,
     ),
-    Seen("castles, castle 1 pushed by 1.02 mm by the stick", CASTLES, [shift("castle1", 3, 1.02, 0, 0)], True),
-    Seen(
-        "tower, both castles turned by 1.4 degrees by the stick: 1.04 mm at the corners",
-        TOWER,
-        [moved(3, mm(0, 0, 0, (0, 0, 1.4)))],
-        True,
-    ),
-    Seen("castles, castle 1 pushed away by 3 mm and back", CASTLES, [shift("castle1", 2, 3, 0, 0, until=3)], True),
     Seen("pockets, the stick works itself out at the end", POCKETS, [shift("stick", END, 60, 0, 0)], False),
 ]
 """What happened to it after it was built."""
 
 ON_THE_WAY = [
     Seen("tower, the last operation was not ended, yet everything is in its place", TOWER, [never(3)], True),
-    Seen("castles, operation 2 was left out and castle 2 stands in its place", CASTLES, [never(2)], True),
     Seen(
         "carried stick, the cube hung 5 mm above castle 1 when it got the stick",
         CARRIED,
         [moved(3, mm(0, 0, 5), "cube", "stick", until=5)],
-        True,
-    ),
-    Seen(
-        "pockets, cube 3 stood 3 mm off cube 1 and 0.15 mm in the air before",
-        POCKETS,
-        [shift("cube3", 3, -3, 0, 0.15, until=6)],
         True,
     ),
     Seen("aligned blocks, A stands 3 mm off where B was", ALIGNED, [shift("A", 2, -3, 0, 0)], True),
@@ -250,13 +203,10 @@ MARGINS = [
     Seen("bridge, A over 49 % of each block", BRIDGE, [shift("A", 3, 0, 25.5, 0)], False),
     Seen("bridge, A 0.09 mm above the blocks", BRIDGE, [shift("A", 3, 0, 0, 0.09)], True),
     Seen("bridge, A 0.11 mm above the blocks", BRIDGE, [shift("A", 3, 0, 0, 0.11)], False),
-    Seen("tower, the stick 0.34 mm aside", TOWER, [shift("stick", 3, 0, 0.34, 0)], True),
-    Seen("tower, the stick 0.36 mm aside", TOWER, [shift("stick", 3, 0, 0.36, 0)], False),
 ]
 """Just below and just above a threshold."""
 
 FIXTURES = [
-    Seen("fixture, the cube put down on the floor beside the table", FIXTURE, [put("cube", 4, mm(900, 0, -700))], True),
     Seen(
         "fixture, the cube was not put away: it stands against castle 2",
         FIXTURE,
@@ -265,9 +215,7 @@ FIXTURES = [
     ),
     Seen("fixture, the cube put down on the finished assembly", FIXTURE, [put("cube", 4, mm(70, 0, 75))], False),
     Seen("fixture, the cube is still held at the end", FIXTURE, [state(END, released=False)], False),
-    Seen("fixture, the cube slips 20 mm after it was put away", FIXTURE, [shift("cube", 5, 20, 0, 0)], True),
     Seen("fixture, castle 2 pushed by 2 mm when the cube was taken", FIXTURE, [shift("castle2", 4, 0, 2, 0)], False),
-    Seen("pockets, cube 1 on top of cube 3", POCKETS, [put("cube1", 6, mm(60, 150, 69))], False),
     Seen("kept block: B ends 10 mm off C", kept, [shift("B", 4, 10, 0, 0)], False),
     Seen(
         "block used later: B pushed by 3 mm under D",
@@ -275,14 +223,7 @@ FIXTURES = [
         [shift("B", 4, 3, 0, 0), shift("D", 4, 3, 0, 0)],
         True,
     ),
-    Seen(
-        "block used later: B and D elsewhere",
-        used_later,
-        [moved(3, mm(0, 90, 0), "B"), moved(4, mm(0, 90, 0), "D")],
-        True,
-    ),
     Seen("block aligned twice: A pushed by 5 mm when D goes", aligned_twice, [shift("A", 5, -5, 0, 0)], True),
-    Seen("stop for two: B pushed by 3 mm when D goes", stop_for_two, [shift("B", 5, -3, 0, 0)], True),
 ]
 """Parts that were used and put away, and parts that only look like that."""
 
@@ -302,9 +243,7 @@ DIFFERS = {
     "bridge, B and C in each other's place": ALIKE,
     "pockets, the cubes in each other's pocket": f"{ALIKE}; fixed parts have no symmetry either",
     "tower, the last operation was not ended, yet everything is in its place": NOT_ENDED,
-    "castles, operation 2 was left out and castle 2 stands in its place": NOT_ENDED,
     "fixture, the cube put down on the finished assembly": "where a fixture ends is free",
-    "pockets, cube 1 on top of cube 3": "where a fixture ends is free",
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""
 

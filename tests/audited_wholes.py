@@ -6,8 +6,8 @@ part was put on the others, to a millimetre; where the whole was put on the tabl
 
 from __future__ import annotations
 
-from tests.audited_states import HALF_Z, QUARTER_X, Seen, kept
-from tests.end_states import BRIDGE, CARRIED, CASTLES, END, FIXTURE, POCKETS, TOWER, moved, put, shift
+from tests.audited_states import HALF_Z, Seen, kept
+from tests.end_states import BRIDGE, CASTLES, END, FIXTURE, TOWER, moved, shift
 from tests.scenes import mm
 
 UPPER = ("castle2", "stick")
@@ -15,9 +15,7 @@ UPPER = ("castle2", "stick")
 WHOLES = [
     Seen("tower, all of it nudged by 40 mm at the end", TOWER, [moved(END, mm(40, 0, 0))], True),
     Seen("tower, all of it turned by 130 degrees at the end", TOWER, [moved(END, mm(0, 0, 0, (0, 0, 130)))], True),
-    Seen("tower, all of it tipped over onto its side", TOWER, [moved(END, mm(0, 0, 30, QUARTER_X))], False),
     Seen("tower, castle 1 pushed by 5 mm when castle 2 came onto it", TOWER, [moved(2, mm(5, 3, 0))], True),
-    Seen("castles, all of it turned by 20 degrees at the end", CASTLES, [moved(END, mm(0, 0, 0, (0, 0, 20)))], True),
     Seen(
         "fixture, the castles with the stick nudged by 4 mm at the end, the cube not",
         FIXTURE,
@@ -25,21 +23,13 @@ WHOLES = [
         True,
     ),
     Seen("kept block: B and C pushed by 7 mm at the end", kept, [moved(END, mm(0, 7, 0), "B", "C")], True),
-    Seen("kept block: A, which stands alone, pushed by 7 mm at the end", kept, [moved(END, mm(0, 7, 0), "A")], True),
 ]
 """Moved as one."""
 
 HALVES = [
     Seen("tower, castle 2 with the stick nudged by 1.5 mm along", TOWER, [moved(END, mm(1.5, 0, 0), *UPPER)], False),
-    Seen("tower, castle 2 with the stick nudged by 0.8 mm along", TOWER, [moved(END, mm(0.8, 0, 0), *UPPER)], True),
     Seen("tower, the stick slid by 1.5 mm along at the end", TOWER, [shift("stick", END, 1.5, 0, 0)], False),
     Seen("tower, the stick slid by 1.5 mm along when it was put", TOWER, [shift("stick", 3, 1.5, 0, 0)], True),
-    Seen(
-        "tower, all of it turned by 5 degrees, and the stick slid by 1.5 mm",
-        TOWER,
-        [moved(END, mm(0, 0, 0, (0, 0, 5))), shift("stick", END, 1.5, 0, 0)],
-        False,
-    ),
     Seen(
         "tower, castle 2 slid by 0.9 mm one way, the stick by 0.9 mm the other",
         TOWER,
@@ -52,19 +42,8 @@ HALVES = [
         [shift("castle2", END, 0, 0.3, 0)],
         True,
     ),
-    Seen(
-        "carried stick, the cube with the stick slid by 1.5 mm along the slots",
-        CARRIED,
-        [moved(END, mm(1.5, 0, 0), "cube", "stick")],
-        False,
-    ),
-    Seen("bridge, A slid by 1.5 mm on both blocks", BRIDGE, [shift("A", END, 1.5, 0, 0)], False),
     Seen("bridge, A turned by 2 degrees on the blocks", BRIDGE, [shift("A", END, 0, 0, 0, (0, 0, 2))], False),
     Seen("bridge, A turned end for end at the end", BRIDGE, [shift("A", END, 0, 0, 0, HALF_Z)], True),
-    Seen("pockets, cube 1, put away, nudged by 30 mm", POCKETS, [shift("cube1", END, 0, 30, 0)], True),
-    Seen(
-        "pockets, cube 2 out of its pocket, on the table beside it", POCKETS, [put("cube2", 7, mm(-60, 60, 25))], False
-    ),
 ]
 """Parts of a whole moved, the others not."""
 

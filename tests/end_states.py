@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from apo_bench import Criteria, Verdict, judge
 from apo_bench.assembly import Reached, Snapshot, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.contacts import Judgement
+from apo_bench.judging.judgement import Judgement
 from apo_bench.records import Thresholds
 from tests import scenes
 

@@ -22,7 +22,6 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.formats.observation import as_planned
 from apo_bench.resources import folder
 from apo_bench.scenario.parts.making import rectangle
-from apo_bench.simulation.arms.arm import read_description
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"
@@ -213,11 +212,6 @@ ONE_NAME: tuple[tuple[str, Callable[[Path], Any], Any], ...] = (
         ("six_axis",),
     ),
     ("tracks", lambda at: [track.name for track in read_tracks("range")], ["range"]),
-    (
-        "arm",
-        lambda at: read_description(written(at, "schema = 'apo-bench/arm/1'\nmjcf = 'a.xml'\njoints = 'hinge'")).joints,
-        ("hinge",),
-    ),
     ("data set", lambda at: next(islice(endless_pairs(SCENARIO), 1)).scenarios, (SCENARIO,)),
     ("parts", lambda at: apo_bench.Assembly({}, (), "table").fixed, frozenset({"table"})),  # type: ignore[arg-type]
     ("carried parts", lambda at: Operation("a", carries="bc").carries, ("bc",)),

@@ -22,9 +22,9 @@ BREACHES = {
     "layers": [
         ("apo_bench.correction.contact.contact", "apo_bench.simulation.scene.world"),
         ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact.contact"),
-        ("apo_bench.scenario.file", "apo_bench.trial.trial"),
-        ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
-        ("apo_bench.perception.observation.noise", "apo_bench.trial.trial"),
+        ("apo_bench.scenario.file", "apo_bench.trial.run"),
+        ("apo_bench.geometry.pose", "apo_bench.assembly.poses"),
+        ("apo_bench.perception.observation.noise", "apo_bench.trial.run"),
     ],
     "scenario": [
         ("apo_bench.scenario.parts.load", "apo_bench.scenario.file"),
@@ -82,11 +82,11 @@ BREACHES = {
         ("apo_bench.correction.contact.starts", "apo_bench.correction.contact.contact"),
     ],
     "calibration": [
-        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
-        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.robot_estimate"),
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.robot_estimate"),
     ],
     "importers-used": [
-        ("apo_bench.trial.trial", "apo_bench.importers.recording.importing"),
+        ("apo_bench.trial.run", "apo_bench.importers.recording.importing"),
         ("apo_bench.viz.card", "apo_bench.importers.assembly.draft"),
         ("apo_bench.scenario.file", "apo_bench.importers.cad.importing"),
     ],
@@ -118,9 +118,9 @@ BREACHES = {
         ("apo_bench.correction.solvers.compact", "apo_bench.simulation.scene.settling"),
     ],
     "records": [
-        ("apo_bench.benchmark.report.report", "apo_bench.trial.trial"),
+        ("apo_bench.benchmark.report.report", "apo_bench.trial.run"),
         ("apo_bench.benchmark.analysis.rates", "apo_bench.simulation.scene.scene"),
-        ("apo_bench.records.settings", "apo_bench.assembly.goals"),
+        ("apo_bench.records.settings", "apo_bench.assembly.poses"),
     ],
     "simulators": [
         ("apo_bench.envs.apo_replay", "mujoco"),
@@ -132,7 +132,7 @@ BREACHES = {
         ("apo_bench.envs.apo_replay", "dm_control"),
         ("apo_bench.envs", "dm_control"),
     ],
-    "gymnasium": [("apo_bench.trial.trial", "gymnasium"), ("apo_bench.simulation.scene.scene", "gymnasium")],
+    "gymnasium": [("apo_bench.trial.run", "gymnasium"), ("apo_bench.simulation.scene.scene", "gymnasium")],
 }
 
 

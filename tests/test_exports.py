@@ -12,7 +12,7 @@ import pytest
 import apo_bench
 
 PACKAGE = Path(apo_bench.__file__).parent
-VERBS = ("demonstrate", "observe", "recognise", "correct", "replay", "judge", "run_trial", "run_sweep")
+VERBS = ("demonstrate", "observe", "detect_contacts", "correct", "replay", "judge", "run_trial", "run_sweep")
 
 
 def test_the_verbs_and_their_records_are_exported() -> None:

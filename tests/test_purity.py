@@ -39,7 +39,7 @@ def python(code: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_list_is_not_empty() -> None:
-    expected = {"assembly.topology", "assembly.goals", "judging.verdict", "correction.baselines.paper"}
+    expected = {"assembly.topology", "assembly.observation", "judging.verdict", "correction.baselines.paper"}
     assert {f"apo_bench.{name}" for name in expected} <= set(pure_modules())
 
 

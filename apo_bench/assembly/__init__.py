@@ -5,20 +5,13 @@ from apo_bench.assembly.correction_record import (
     Correction,
     Hypothesis,
     Iterate,
-    Look,
-    LookingCorrector,
+    Reobserver,
+    ReobservingCorrector,
     Suspect,
     Try,
 )
+from apo_bench.assembly.demonstration import Demonstration, Layout
 from apo_bench.assembly.equations import Equations, largest, largest_gap
-from apo_bench.assembly.error_models import (
-    OutlierModel,
-    SharedError,
-    Tails,
-    first_order,
-    joint_covariance,
-    measured_rates,
-)
 from apo_bench.assembly.facing_round import (
     CONTACT_KINDS,
     ContactKind,
@@ -29,23 +22,17 @@ from apo_bench.assembly.facing_round import (
     play_mm,
     round_pairs,
 )
-from apo_bench.assembly.goals import (
-    SCHEDULE_REMEDY,
-    Demonstration,
-    Layout,
-    Observation,
-    Plan,
-    Poses,
-    Step,
-    goals_in_force,
-    placements,
-    schedule_fault,
-)
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
-from apo_bench.assembly.lowering import lowered, lowered_observation, lowered_together
-from apo_bench.assembly.pattern import Pattern, looking_away
+from apo_bench.assembly.observation import Observation
+from apo_bench.assembly.outlier_model import OutlierModel, measured_rates
+from apo_bench.assembly.pattern import Pattern, faces_away
+from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, poses_in_force, schedule_fault
+from apo_bench.assembly.poses import Poses, placements
+from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
 from apo_bench.assembly.reached import InHand, Outcome, ProbingResult, Reached, ReplayResult, Snapshot
+from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import (
     ODL,
     Assembly,
@@ -55,19 +42,19 @@ from apo_bench.assembly.topology import (
     Operation,
     PartFace,
     Relation,
-    inverted,
+    invert,
     product,
-    simplified,
-    spelled,
+    simplify,
+    spell,
 )
 from apo_bench.assembly.touch import Touch
 from apo_bench.assembly.touching import (
     TouchedContact,
     corners,
     face_gap,
+    faces_oppose,
     height,
     mouth,
-    opposed,
     outline_points,
     touched_contacts,
 )
@@ -93,8 +80,6 @@ __all__ = (
     "InHand",
     "Iterate",
     "Layout",
-    "Look",
-    "LookingCorrector",
     "Node",
     "Observation",
     "Operation",
@@ -107,6 +92,8 @@ __all__ = (
     "ProbingResult",
     "Reached",
     "Relation",
+    "Reobserver",
+    "ReobservingCorrector",
     "ReplayResult",
     "SharedError",
     "Snapshot",
@@ -122,32 +109,32 @@ __all__ = (
     "corners",
     "deep_limit_mm",
     "face_gap",
+    "faces_away",
+    "faces_oppose",
     "first_order",
     "geometric_play",
-    "goals_in_force",
     "height",
-    "inverted",
+    "invert",
     "joint_covariance",
     "joint_play_mm",
     "largest",
     "largest_gap",
-    "looking_away",
-    "lowered",
-    "lowered_observation",
-    "lowered_together",
     "measure_round",
     "measured_rates",
     "mouth",
     "observed_residuals",
-    "opposed",
     "outline_points",
     "placements",
     "play_mm",
+    "poses_in_force",
     "product",
+    "project_observation",
+    "project_observations",
+    "project_round_faces",
     "relation_graph",
     "round_pairs",
     "schedule_fault",
-    "simplified",
-    "spelled",
+    "simplify",
+    "spell",
     "touched_contacts",
 )

@@ -7,7 +7,8 @@ from typing import NamedTuple, Protocol, final, runtime_checkable
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly.goals import Observation, Plan, Step
+from apo_bench.assembly.observation import Observation
+from apo_bench.assembly.plan import Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze
@@ -178,30 +179,30 @@ class Correction:
 
 
 @runtime_checkable
-class Look(Protocol):
-    """What a corrector is handed that may look again: called with operations, counted from 0, it looks once at them.
+class Reobserver(Protocol):
+    """Observes operations again, counted from 0, when it is called with them; a corrector may be handed one.
 
-    Each look has errors of its own, by the noise of the first, so it may be an outlier or a miss as well.
+    Each observation has its own errors, by the noise of the first, so it may be an outlier or a miss as well.
     """
 
     @property
     def left(self) -> int:
-        """Looks that may still be taken."""
+        """Observations that are left."""
 
     def __call__(self, operations: Collection[int]) -> Observation:
-        """What is seen this time; operations that were not asked for are not `seen`.
+        """Observe some operations once; all others are not `observed`.
 
         Raises:
-            InputError: No look is left, or there is no such operation.
+            InputError: No observation is left, or there is no such operation.
         """
 
 
 @runtime_checkable
-class LookingCorrector(Protocol):
-    """A corrector that can ask; one without `looking` is never handed a look."""
+class ReobservingCorrector(Protocol):
+    """A corrector that can ask; one without this method is never handed a reobserver."""
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation that cannot be looked at again."""
 
-    def looking(self, observation: Observation, look: Look) -> Correction:
-        """Correct an observation, looking again as often as is allowed and needed."""
+    def correct_and_reobserve(self, observation: Observation, reobserve: Reobserver) -> Correction:
+        """Correct an observation, observing again as often as is allowed and needed."""

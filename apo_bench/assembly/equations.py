@@ -20,8 +20,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.pattern import cross_rows, pattern
+from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, product
 from apo_bench.geometry import Array, pose
 
@@ -129,7 +129,7 @@ class Equations:
 def equations(assembly: Assembly, start: Poses, goals: Array) -> Equations:
     """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
 
-    Contacts of round faces are those of sheets (`lowered`).
+    Contacts of round faces are those of sheets (`project_round_faces`).
 
     The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `goals`: of
     one face only, since both would raise the spurious singular values, and whole, since a lever as long as a table

@@ -1,6 +1,6 @@
 """Pairs of faces of which at least one is round: how far off, how far askew, how much of each other they hold.
 
-What is measured of a pair are as many numbers as its contact has equations (`apo_bench.assembly.lowering`), lengths
+What is measured of a pair are as many numbers as its contact has equations (`apo_bench.assembly.projection`), lengths
 first: how far off an axis is, across the other one or in front of a plane, then how far a cone is from its seat; then
 tilts. A turn about the axis changes none of them, so it does not matter how a part of revolution was seen turned.
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.assembly.equations import equations, largest
-from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
+from apo_bench.assembly.observation import Observation
+from apo_bench.assembly.poses import Poses
+from apo_bench.assembly.projection import project_round_faces
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, invert, simplify, spell
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 
@@ -34,7 +35,7 @@ class Node:
         """`cube2 (6): T6 T5^-1 T2`; a part that was never moved has the T0 of the paper's work table."""
         if self.placed is None:
             return f"{self.part}: T0"
-        return f"{self.part} ({self.placed + 1}): {spelled(self.odl)}"
+        return f"{self.part} ({self.placed + 1}): {spell(self.odl)}"
 
 
 @final
@@ -71,7 +72,7 @@ class Arc:
     @property
     def operations(self) -> frozenset[int]:
         """The operations whose motion parameters occur in the equations D_a^-1 D_b of this arc (Eq. 26)."""
-        word = simplified((*inverted(self.manipulated.odl), *self.environment.odl))
+        word = simplify((*invert(self.manipulated.odl), *self.environment.odl))
         return frozenset(term.operation for term in word)
 
 
@@ -117,7 +118,7 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
 
 def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
     """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
-    done = lowered(assembly.first(graph.step))
+    done = project_round_faces(assembly.first(graph.step))
     reached = goals[: graph.step]
     gaps = equations(done, start, reached).gaps(reached)
     named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]

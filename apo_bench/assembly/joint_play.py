@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import contact_kind, play_mm
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose
 

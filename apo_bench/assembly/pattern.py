@@ -1,7 +1,7 @@
 """What the contact equations of an assembly have in common, wherever its parts are; and which faces look away.
 
 The equations say that vertices of one face lie in the plane of the other, whichever way the two look: a cube upside
-down inside the table satisfies them as well as one that stands on it. So this is asked apart (`looking_away`). Nothing
+down inside the table satisfies them as well as one that stands on it. So this is asked apart (`faces_away`). Nothing
 keeps a cone on a rim from tilting, so it may by up to a right angle; planes through an axis have no sense.
 """
 
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.facing_round import OPPOSING, contact_kind
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, simplified
+from apo_bench.assembly.poses import Poses
+from apo_bench.assembly.projection import project_round_faces
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, invert, simplify
 from apo_bench.geometry import Array, Face, remembered
 
 _MOST_CORNERS = 8
@@ -52,8 +52,8 @@ class Pattern:
 
 @remembered
 def pattern(assembly: Assembly) -> Pattern:
-    """What the equations of an assembly have in common; its contacts are those of `lowered(assembly)`."""
-    if (low := lowered(assembly)) is not assembly:
+    """What the equations of an assembly have in common; its contacts are those of `project_round_faces(assembly)`."""
+    if (low := project_round_faces(assembly)) is not assembly:
         return pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
@@ -94,9 +94,9 @@ def _opposing(assembly: Assembly, contact: Contact) -> float:
     return 0.0 if tilts else OPPOSING
 
 
-def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
+def faces_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
     """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
-    `relations()`; those of round faces as `lowered` has them.
+    `relations()`; those of round faces as `project_round_faces` has them.
 
     Args:
         goals: (*, n, 4, 4), world frame, [m].
@@ -128,7 +128,7 @@ def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, in
     """
     rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
     return [
-        (contact, k - len(parts), simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part])))
+        (contact, k - len(parts), simplify((*invert(D[contact.manipulated.part]), *D[contact.environment.part])))
         for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
         for contact in operation.contacts
     ]

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly.goals import Poses, Step
+from apo_bench.assembly.plan import Step
+from apo_bench.assembly.poses import Poses
 from apo_bench.geometry import copyable, freeze
 
 

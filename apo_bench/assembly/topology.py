@@ -201,7 +201,7 @@ class Assembly:
         for k, operation in enumerate(self.operations):
             before = current.get(operation.main, ())
             for part in operation.carries:
-                current[part] = simplified((Term(k), *inverted(before), *current.get(part, ())))
+                current[part] = simplify((Term(k), *invert(before), *current.get(part, ())))
             current[operation.main] = (Term(k),)
             yield current
 
@@ -251,12 +251,12 @@ def _lost(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> in
     return min(later, default=None)
 
 
-def inverted(odl: Iterable[Term]) -> ODL:
+def invert(odl: Iterable[Term]) -> ODL:
     """The inverse product: reversed order, each term inverted."""
     return tuple(Term(k, not inverse) for k, inverse in reversed(tuple(odl)))
 
 
-def simplified(odl: Sequence[Term]) -> ODL:
+def simplify(odl: Sequence[Term]) -> ODL:
     """An ODL without neighbours that cancel, such as T2 T2^-1."""
     out: list[Term] = []
     for term in odl:
@@ -267,7 +267,7 @@ def simplified(odl: Sequence[Term]) -> ODL:
     return tuple(out)
 
 
-def spelled(odl: Iterable[Term]) -> str:
+def spell(odl: Iterable[Term]) -> str:
     """The ODL as the paper writes it, counted from 1: `T6 T5^-1 T2`; the empty product is `I`."""
     return " ".join(f"T{k + 1}{'^-1' if inverse else ''}" for k, inverse in odl) or "I"
 

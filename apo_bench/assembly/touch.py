@@ -5,23 +5,25 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.errors import InputError, kind, require
-from apo_bench.geometry import FARTHEST_M, Array, copyable, frozen, is_rigid
+from apo_bench.arguments import check_arguments
+from apo_bench.errors import require
+from apo_bench.geometry import FARTHEST_M, Array, copyable, freeze, frozen, is_rigid
 
 SMALLEST_SIGMA_M = 1e-9
-"""No touch tells a place more exactly; rounding would no longer be small beside it."""
+"""No touch measures a place more exactly; rounding would no longer be small against it."""
 _NOT_UNIT = 1e-6
 """How far the length of a normal may be from 1."""
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Touch:
     """n . (X h v) = d: X is where the tip really is, h how the part lies in the hand, v the point."""
 
     T_world_tip: Array
-    """(4, 4): where the robot believed its tip when it touched, [m]."""
+    """(4, 4): where the robot assumed its tip when it touched, [m]."""
     normal: Array
     """(3,): the unit normal n of the plane, world frame."""
     offset: float
@@ -29,43 +31,34 @@ class Touch:
     point: Array
     """(3,), [m]: v, in the frame of the tip, or of the part that is held."""
     sigma_m: float
-    """How exactly the touch tells the distance: a standard deviation, [m]."""
+    """How exactly the touch measures the distance: a standard deviation, [m]."""
     jacobian: Array | None = None
     """(6, joints): body Jacobian at `T_world_tip`, [m/rad, rad/rad]; None: as if the encoders were exact."""
     grasp: int | None = None
     """The number of the grasp that held the part; None: the hand itself touched."""
     T_tip_part: Array | None = None
-    """(4, 4): where the part was believed in the frame of the tip, [m]; None: its frame is that of the tip."""
+    """(4, 4): where the part was assumed in the frame of the tip, [m]; None: its frame is that of the tip."""
 
     def __post_init__(self) -> None:
         """Raises:
         InputError: A shape or number that is not allowed.
         """
+        freeze(self, T_world_tip=(4, 4), normal=(3,), point=(3,), jacobian=(6, None), T_tip_part=(4, 4))
         require(
             self.grasp is not None or self.T_tip_part is None,
             "a touch with a part in the hand was given, but not its grasp; state the number of the grasp.",
         )
-        checked = {
-            "T_world_tip": checked_pose("pose of the tip", self.T_world_tip),
-            "normal": checked_array("normal", self.normal, 3),
-            "point": checked_array("point", self.point, 3),
-            "offset": _number("offset", self.offset),
-            "sigma_m": _number("sigma", self.sigma_m),
-        }
-        if self.jacobian is not None:
-            checked["jacobian"] = checked_array("Jacobian", self.jacobian, 6, None)
-        if self.T_tip_part is not None:
-            checked["T_tip_part"] = checked_pose("pose of the part in the hand", self.T_tip_part)
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        checked_pose("pose of the tip", self.T_world_tip)
+        checked_pose("pose of the part in the hand", np.eye(4) if self.T_tip_part is None else self.T_tip_part)
         length = float(np.linalg.norm(self.normal))
         require(
             abs(length - 1.0) <= _NOT_UNIT,
             f"a touch of a plane with a normal of length {length:.6g} was given; divide it by its length.",
         )
+        require(np.isfinite(self.offset), f"a touch with {self.offset} as offset was given; give a finite number.")
         require(
             SMALLEST_SIGMA_M <= self.sigma_m <= FARTHEST_M,
-            f"a touch with a sigma of {self.sigma_m:g} m was given; sigmas from {SMALLEST_SIGMA_M:g} m on are allowed.",
+            f"a touch with a sigma of {self.sigma_m:g} m was given; give one of {SMALLEST_SIGMA_M:g} m or more.",
         )
 
 
@@ -75,27 +68,6 @@ def checked_pose(name: str, value: Any) -> Array:
     Raises:
         InputError: It is none.
     """
-    T = checked_array(name, value, 4, 4)
+    T = frozen(value, 4, 4)
     require(is_rigid(T[None])[0], f"the {name} was given as a matrix that is no rigid pose; give a turn and a shift.")
     return T
-
-
-def checked_array(name: str, value: Any, *shape: int | None) -> Array:
-    """A read-only copy of an array.
-
-    Raises:
-        InputError: Another shape, or numbers that are no finite ones.
-    """
-    try:
-        return frozen(value, *shape)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the {name} cannot be used: {error}.") from error
-
-
-def _number(name: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"a touch with {kind(value)} as {name} was given; a number is needed.") from error
-    require(np.isfinite(number), f"a touch with {number} as {name} was given; a finite number is needed.")
-    return number

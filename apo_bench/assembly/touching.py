@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import Facing, contact_kind, measure_round, round_pairs
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
     WHOLE_TURN,
@@ -142,7 +142,7 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
         yield np.cos(turn) * x + np.sin(turn) * y
 
 
-def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
+def faces_oppose(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
     """Whether two posed faces look at each other, their normals opposite within an angle."""
     return bool((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal) < -np.cos(angle_rad))
 

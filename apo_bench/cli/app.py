@@ -1,4 +1,4 @@
-"""The command line: `apo-bench scenarios | graph | explain | correct | scene | replay | sweep | report | ..`.
+"""The command line: `apo-bench scenario list | graph | explain | correct | scene | replay | sweep | report | ..`.
 
 Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
 request was wrong, with one sentence on stderr; 128 and the number of the signal that ended it. Lengths in mm, angles in
@@ -16,15 +16,15 @@ from apo_bench import __version__
 from apo_bench.cli import noise, part, recording, scenario, score, sweep
 from apo_bench.cli.arguments import NO_RESULT
 from apo_bench.cli.correct_command import correct_command
-from apo_bench.cli.explain_command import explain_command
-from apo_bench.cli.eye import eye_command
-from apo_bench.cli.graph import graph_command
-from apo_bench.cli.help import Grouped, GroupedOptions
-from apo_bench.cli.plan import plan_command
-from apo_bench.cli.recognise_command import recognise_command
-from apo_bench.cli.replay_command import run_replay
-from apo_bench.cli.scene import scene_command
-from apo_bench.cli.show import show_command
+from apo_bench.cli.detect_command import detect_contacts_command
+from apo_bench.cli.help import Grouped, GroupedOptions, group
+from apo_bench.cli.inspect_depth import depth_command
+from apo_bench.cli.inspect_dof import dof_command
+from apo_bench.cli.inspect_graph import graph_command
+from apo_bench.cli.inspect_plan import plan_command
+from apo_bench.cli.inspect_poses import poses_command
+from apo_bench.cli.inspect_scene import scene_command
+from apo_bench.cli.run_command import run_command
 from apo_bench.cli.view import view_command
 from apo_bench.errors import InputError
 from apo_bench.io import brief, clean, streams
@@ -63,7 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # what the command line library makes of a pipe that nobody reads
         if not isinstance(error.__context__, OSError):
             raise
-        return _complain(streams.unexpected(error.__context__), NO_RESULT)
+        streams.give_up_output()
+        return 0
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise
@@ -94,29 +95,33 @@ def _options(
     """Options of every command."""
 
 
-_LONG = ("replay", "sweep")
+_LONG = ("run", "sweep")
 """Commands whose options are listed in groups."""
 _COMMANDS: dict[str, Callable[..., None]] = {
-    "graph": graph_command,
-    "explain": explain_command,
+    "run": run_command,
+    "view": view_command,
     "correct": correct_command,
-    "pose_source": eye_command,
-    "plan": plan_command,
-    "recognise": recognise_command,
-    "scenarios": scenario.scenarios_command,
-    "show": show_command,
+    "detect-contacts": detect_contacts_command,
     "sweep": sweep.sweep_command,
     "report": score.report_command,
     "compare": score.compare_command,
     "score": score.score_command,
     "leaderboard": score.leaderboard_command,
-    "view": view_command,
-    "scene": scene_command,
-    "replay": run_replay,
 }
+_INSPECT: dict[str, Callable[..., None]] = {
+    "dof": dof_command,
+    "plan": plan_command,
+    "graph": graph_command,
+    "scene": scene_command,
+    "poses": poses_command,
+    "depth": depth_command,
+}
+inspect = group("inspect", "Look into one plan: free directions, motions, relation graph, scene, poses, depth images.")
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _group in (sweep.dataset, noise.noise, part.arm, part.part, scenario.scenario, recording.recording):
+for _name, _command in _INSPECT.items():
+    inspect.command(_name)(_command)
+for _group in (inspect, sweep.dataset, noise.noise, part.arm, part.part, scenario.scenario, recording.recording):
     app.add_typer(_group)
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ NO_RESULT = 1
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
-        help="A name out of `apo-bench scenarios`, generated:SEED, or a scenario file.",
+        help="A name out of `apo-bench scenario list`, generated:SEED, or a scenario file.",
         autocompletion=completion("scenario"),
     ),
 ]

@@ -35,7 +35,7 @@ def correct_command(
     deviation_deg: DeviationDeg = 1.0,
     camera_noise: Annotated[
         Path | None,
-        typer.Option(help="Take the noise of this file, of `noise learn` or `noise fit`, for what the camera states."),
+        typer.Option(help="Take the noise of this file, as `noise fit` writes it, for what the camera states."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -55,10 +55,10 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
-        from apo_bench.perception.observation.models.fitted import restated
+        from apo_bench.perception.observation.models.fitted import restate
         from apo_bench.perception.observation.noise_file import read_noise
 
-        seen = restated(seen, *read_noise(camera_noise))
+        seen = restate(seen, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
         correction = correct(seen, corrector)
@@ -89,7 +89,7 @@ def correct_command(
 
 def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
-    from apo_bench.correction.checks.status import gap_of
+    from apo_bench.correction.checks.as_given import gap_of
     from apo_bench.correction.explanation import explain
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
@@ -118,7 +118,8 @@ def _corrector(method: str, doubt: str | None) -> Any:
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     from apo_bench.formats.csv_form import table
-    from apo_bench.formats.json_forms import plan_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.plan_json import plan_form
 
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)

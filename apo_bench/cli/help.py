@@ -9,9 +9,8 @@ from typer.core import TyperCommand, TyperGroup
 
 GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "Start": ("scenarios", "replay", "view", "show"),
-        "One plan, looked into": ("graph", "explain", "plan", "scene"),
-        "Your own poses and cameras": ("correct", "recognise", "recording", "pose_source", "noise"),
+        "One trial": ("run", "view", "inspect"),
+        "Your own poses and cameras": ("correct", "detect-contacts", "recording", "noise"),
         "Your own tasks and arms": ("scenario", "part", "arm"),
         "Many trials": ("sweep", "report", "compare", "score", "leaderboard", "dataset"),
     }
@@ -40,7 +39,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "What is shown": ("--view", "--port", "--json"),
     }
 )
-"""Heading -> options of `apo-bench replay` and `sweep`, in this order."""
+"""Heading -> options of `apo-bench run` and `sweep`, in this order."""
 OTHERS = "Other options"
 """The heading of options that stand under none."""
 _WHOLE = 10_000

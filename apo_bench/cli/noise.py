@@ -1,4 +1,4 @@
-"""The commands `apo-bench noise list | card | fit | still`: noise models, cards, noise that is measured."""
+"""The commands `apo-bench noise list | show | fit | still`: noise models, cards, noise that is measured."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,7 +24,7 @@ def noise_list() -> None:
     width = max(map(len, models))
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
-    typer.echo("\nThe card of one: apo-bench noise card NAME")
+    typer.echo("\nThe card of one: apo-bench noise show NAME")
 
 
 noise = group("noise", _HELP, noise_list)
@@ -34,7 +34,7 @@ _Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into t
 _Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
-@noise.command("card")
+@noise.command("show")
 def print_noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
     noise_level: Annotated[

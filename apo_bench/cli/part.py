@@ -158,7 +158,7 @@ def arm_list() -> None:
 def arm_check(
     name: Annotated[str, typer.Argument(metavar="ARM", help="A name, FILE.toml, menagerie:NAME or robosuite:NAME.")],
     scenario: Annotated[
-        str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")
+        str, typer.Argument(help="A name out of `apo-bench scenario list`, or a scenario file.")
     ] = "stick_in_tower",
     layouts: Annotated[int, typer.Option(min=1, max=1000, help="How many layouts are looked at.")] = 20,
     out: Annotated[Path | None, typer.Option(help="Draw it at the table into this file: .png.")] = None,

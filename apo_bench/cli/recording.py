@@ -74,7 +74,8 @@ def _import(
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [operation.rest for operation in imported.operations]
     if out.suffix.lower() == ".json":
-        from apo_bench.formats.json_forms import observation_form, write_form
+        from apo_bench.formats.json_forms import write_form
+        from apo_bench.formats.observation_json import observation_form
 
         name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
         write_form(observation_form(imported.observation, name), out)

@@ -1,4 +1,4 @@
-"""The commands `apo-bench scenario list | card | new | check`: what there is, what one asks for, one of your own."""
+"""The commands `apo-bench scenario list | show | new | check`."""
 
 import shlex
 from pathlib import Path
@@ -26,22 +26,12 @@ scenario = group("scenario", "Scenarios: list, task cards, new ones, checks.", s
 scenario.command("list")(scenario_list)
 
 
-@scenario.command("card")
-def print_card(scenario: ScenarioArgument) -> None:
+@scenario.command("show")
+def scenario_show(scenario: ScenarioArgument) -> None:
     """Print the task card of a scenario; the file is checked."""
     from apo_bench.viz.card import scenario_card
 
     typer.echo(scenario_card(load_scenario(scenario)), nl=False)
-
-
-def scenarios_command(
-    scenario: Annotated[str | None, typer.Argument(help="Print the task card of this one; a name or a file.")] = None,
-) -> None:
-    """List the scenarios that come with the package, or print the task card of one, such as generated:17."""
-    if scenario is None:
-        scenario_list()
-    else:
-        print_card(scenario)
 
 
 @scenario.command("new")

@@ -25,19 +25,14 @@ from apo_bench.assembly import (
     Observation,
     Operation,
     Poses,
-    lowered_observation,
     placements,
+    project_observation,
 )
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.relation_equations import (
-    RelationHold,
-    SharedEstimate,
-    by_relation,
-    estimate_shared,
-    relation_holds,
-)
+from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
+from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
 from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearised_by, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
@@ -147,7 +142,7 @@ def explain(observation: Observation, goals: Array | Correction, dropped: Collec
         dropped = (*goals.dropped, *dropped)
         observation = goals.believed or observation
         goals = goals.poses
-    observation = lowered_observation(observation)
+    observation = project_observation(observation)
     n = len(goals)
     assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Correction, Observation, lowered_observation
+from apo_bench.assembly import Correction, Observation, project_observation
+from apo_bench.correction.contact.drawn import drawn_radius
 from apo_bench.correction.contact.problem import seen_system
-from apo_bench.correction.contact.solved import drawn_radius
 from apo_bench.correction.solvers import coordinates_of, freedom_of, linearised_by, noise_factor
 from apo_bench.geometry import Array, pose, right_jacobian
 
@@ -44,7 +44,7 @@ def _contains(believed: Observation, goals: Array, dropped: tuple[str, ...], tru
     """
     from scipy.special import chdtri
 
-    observation = lowered_observation(believed)
+    observation = project_observation(believed)
     L = noise_factor(observation)
     xi = pose.log(pose.inverse(observation.poses) @ goals)
     system = seen_system(observation).among(_equal(observation, dropped))

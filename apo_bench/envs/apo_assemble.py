@@ -1,4 +1,4 @@
-"""All operations for learners: `APOAssemble-v0`, the same control as `APOInsert-v0`."""
+"""The environment `APOAssemble-v0`; the docstring of the class is its page in the documentation."""
 
 from typing import Any
 
@@ -15,46 +15,46 @@ class APOAssemble(APOInsert):
     """Insert all parts, one after the other.
 
     ## Description
-    As `APOInsert-v0` for every operation of an assembly: the robot takes each part by the plan and holds it before its
-    mouth, the learner leads the tip until the hand lets go, and the robot takes the next.
+    As `APOInsert-v0` for every operation of an assembly: the robot picks each part by the plan and holds it before its
+    hole, the policy moves the tip until the hand opens, and the robot picks the next.
 
     ## Observation Space
-    That of `APOInsert-v0`, and `operation`, `Box(n)`: 1 for the operation that is done, 0 for the others.
+    That of `APOInsert-v0`, and `operation`, `Box(n)`: 1 for the current operation, 0 for the others.
 
     ## Action Space
     That of `APOInsert-v0`. An open hand ends the operation.
 
     ## Rewards
-    1.0 at the end if the judge finds the whole assembly right; else 0.0. With `reward="progress"` also, in each of n
-    operations, the share of its way in, 1 / n in all.
+    1.0 at the end if the judge finds the whole assembly correct, else 0.0. With `reward="progress"` also, in each of n
+    operations, the share of its distance, 1 / n in total.
 
     ## Starting State
     That of `APOInsert-v0` at the first operation.
 
     ## Episode End
-    As in `APOInsert-v0`, after the last operation; before that, where the robot cannot take the next part, or where
-    something is struck, lost or pushed too hard. An operation lasts `horizon` actions at most.
+    As in `APOInsert-v0`, after the last operation; before that, where the robot cannot pick the next part, where
+    something collides, is dropped or is pushed too hard. After `horizon` actions of an operation the hand opens.
 
     ## Arguments
-    Those of `APOInsert-v0` but `operation` and `feels`.
+    Those of `APOInsert-v0` but `operation` and `probe`.
 
     ## Version History
     - v0: first version.
     """
 
     def __init__(self, **settings: Any) -> None:
-        given = [name for name in ("operation", "probing") if name in settings]
+        given = [name for name in ("operation", "probe") if name in settings]
         require(
-            not given, f"{' and '.join(given)} was given; all operations are done here, and nothing is felt before."
+            not given, f"{' and '.join(given)} was given; all operations are done here, by a robot that does not probe."
         )
-        super().__init__(operation=1, probing=False, **settings)
+        super().__init__(operation=1, probe=False, **settings)
         n = len(self.scene.scenario.assembly)
         self.share /= n
         seen = {**self.observation_space.spaces, "operation": spaces.Box(0.0, 1.0, (n,), np.float32)}  # type: ignore[attr-defined]
         self.observation_space = spaces.Dict(seen)
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
-        """Go on with the next operation, or ask the judge."""
+        """Begin the next operation, or ask the judge after the last one."""
         begun = self._now()
         if self.operation == len(begun.plan.assembly):
             return super()._done(control, reached)

@@ -1,4 +1,4 @@
-"""One operation for learners: `APOInsert-v0`. It is long, as the docstring of the class is its page for learners."""
+"""The environment `APOInsert-v0`; the docstring of the class is its page in the documentation."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.episode import asked_options
-from apo_bench.envs.spaces import PIXELS, insert_space, is_uncorrected
-from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
+from apo_bench.envs.episode import EpisodeSettings, Scenes, episode_options, replace_settings, trial_number
+from apo_bench.envs.episode_start import EpisodeStart, Trials, judged
+from apo_bench.envs.robot import RobotSettings
+from apo_bench.envs.spaces import PIXELS, insert_observation, insert_space
 from apo_bench.errors import InputError, require, shown, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
@@ -24,6 +25,7 @@ from apo_bench.records import (
     CORRECTORS,
     EVALUATION_STARTS,
     FIRST_TRAINING_TRIAL,
+    NOISE_MODEL,
     SIMULATED,
     USUAL,
     TrialConfig,
@@ -33,18 +35,20 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.robot import Halt
+from apo_bench.simulation.robot import ExecutionAborted
 from apo_bench.simulation.scene import Scene, build_scene, data_with_arm
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]
 Action = NDArray[np.float32]
 ROBOT_ERROR = "hand_eye:0.5/0.1"
-"""What is wrong with the robot as usual."""
-LETS_GO = 0.5
-"""Of the seventh number of an action: above, the hand lets go; below its negative, it holds."""
+"""The default robot error."""
+RELEASE = 0.5
+"""The last number of an action above which the hand opens; below its negative it stays closed."""
 MOST_TRIES = 100
-"""So many trials in a row may never come to the operation before `reset()` gives up."""
+"""Trials in a row that fail before the operation after which `reset()` gives up."""
+HORIZON = 200
+"""Default number of actions of an operation."""
 _REWARDS = ("judge", "progress")
 _STARTS = ("training", "evaluation")
 _PLANS = ("uncorrected", "oracle", "nominal")
@@ -52,66 +56,67 @@ _PLANS = ("uncorrected", "oracle", "nominal")
 
 @check_arguments
 class APOInsert(gymnasium.Env[Seen, Action]):
-    """Insert one part that the robot holds before its mouth.
+    """Insert one part that the robot holds before its hole.
 
     ## Description
-    A trial of the bench is demonstrated, seen with errors and corrected; a robot with errors of its own carries out all
-    operations before one, takes its part and holds it before where it goes in. From there on the learner leads the tip,
-    at 20 Hz, until the hand lets go. Then the judge says whether all that stands is right.
+    A trial is demonstrated, observed with errors and corrected. A robot with errors of its own executes all operations
+    before one, picks its part and holds it before the hole entrance. From there the policy moves the tip, at 20 Hz,
+    until the hand opens. Then the judge decides whether everything that stands is correct.
 
     ## Observation Space
-    A `Dict` of float32, in the frame of the way in: its third axis leads in, the fingers close along its first.
-    Lengths are in mm, angles in degrees (rotation vectors), forces in N and Nm.
+    A `Dict` of float32, in the frame of the insertion axis: its third axis leads in, the fingers close along its first.
+    Lengths are in mm, angles in degrees (rotation vectors), forces in N and torques in Nm.
 
-    - `agent_pos`, `Box(13)`: where the front of the part is less where it is believed to end (3), the turn (3), by the
-      encoders; what is commanded less that (3, 3); the opening of each finger less half the width of the part.
-    - `ft_sensor`, `Box(6)`: force and torque on the hand and what is in it, about the flange, by the sensor of robots that
-      feel, with its noise, its offset that was zeroed, and its low pass.
-    - `plan`, `Box(19)`: the way in, in the world (3); what is left of it and the least that was left so far; time left,
-      [s]; standard deviations that are stated of the front and its turn (6); the last action (7).
-    - `pixels`, `Box(96, 96, 3)` of uint8, if asked for.
+    - `agent_pos`, `Box(13)`: by the encoders, the front of the part relative to its estimated target (3) and its
+      rotation (3); the commanded minus the measured position and rotation (3, 3); the opening of each finger minus half
+      the width of the part.
+    - `wrench`, `Box(6)`: force and torque on the hand and what it holds, about the flange, from the force-torque sensor
+      with its noise, its offset zeroed, and its low-pass filter.
+    - `plan`, `Box(19)`: the insertion axis in the world (3); the distance left along it and the smallest so far; the
+      time left [s]; stated standard deviations of the front and its rotation (6); the last action (7).
+    - `pixels`, `Box(96, 96, 3)` of uint8, with `pixels=True`.
 
     ## Action Space
-    `Box(-1, 1, (7,))` of float32: a shift (3) and a turn (3) about the front of the part, in the same frame, of at most
-    `shift_mm` and `turn_deg` per axis and action; above 0.5, the last number opens the hand, which ends the episode.
-    With `residual` they are added to the approach of the bench, which goes in, stops where it strikes, goes on under a
-    light push, and lets go where it arrived; a last number below -0.5 has it hold on. The tip gives way to forces by
-    0.5 mm/s for each newton. It is led 15 mm and 10 degrees off the approach at most.
+    `Box(-1, 1, (7,))` of float32: a translation (3) and a rotation (3) about the front of the part, in the same frame,
+    of at most `shift_mm` and `turn_deg` per axis and action. The last number opens the hand above 0.5, which ends the
+    episode. With `residual` actions are added to a scripted approach: it moves in, stops at contact, pushes on lightly
+    and opens the hand where it arrived; a last number below -0.5 keeps the hand closed. The tip yields to forces by
+    0.5 mm/s per newton. It moves at most 15 mm and 10 degrees away from the approach.
 
     ## Rewards
-    1.0 at the end if the judge finds the operation, and those before it, right; else 0.0. With `reward="progress"` also
-    the share of the way in by which the least that was left has become less, by the encoders; 1.0 in all.
+    1.0 at the end if the judge finds the operation and those before it correct, else 0.0. With `reward="progress"` also
+    the share of the distance by which the smallest distance left became smaller, by the encoders; 1.0 in total.
 
     ## Starting State
-    One of `layouts` trials from `first_trial` on, each made when it is first drawn and kept. Trials that fail before
-    the operation begins are passed over. `reset(seed=k)` draws the same, and the same noise of the sensor, whatever
-    came before. `reset(options={"trial": t})` is trial t, of which nothing is kept.
-    With `starts="evaluation"`, `reset(seed=k)` begins at trial k, which is in no pool and in no data set; seeds are
-    below 100000, and a trial that fails before the operation begins is replaced by trial k + 100000, or the next so
-    many further. Different seeds begin at different trials.
+    `reset(seed=k)` and `reset(options={"trial": k})` start at trial k. A trial below 100000 that fails before the
+    operation is replaced by trial k + 100000, and so on; a larger number that fails is an error. `reset()` draws one
+    of `layouts` trials from `first_trial` on, which are kept after they were first prepared, or with
+    `starts="evaluation"` a trial below 100000. Data sets and the pool contain none of these. `reset(options={...})`
+    also takes `noise_level`, `human_error_scale` and `clearance_mm`.
 
     ## Episode End
-    It terminates when the hand lets go: by the learner, by the approach, or after `horizon` actions; where the force
-    on the part exceeds `fails_above_n`, behind a filter of 8 Hz; where something is struck or lost. `info` then holds
-    `success` and `is_success`, `code` and `sentence`. Nothing is truncated, as the time that is left is seen.
+    It terminates when the hand opens, when the filtered force on the part (8 Hz) exceeds `fails_above_n`, and when
+    something collides or is dropped. After `horizon` actions it is truncated: the hand opens and the judge decides.
+    `info` then holds `success` (also as `is_success`), `code` and `sentence`; before, `success` is False.
 
     ## Arguments
-    - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as of `APOReplay-v0`.
-    - `operation`: counted from 1; None: the last one.
-    - `corrector`: what the plan is made by: a corrector, or `none`, `oracle`, `nominal`.
-    - `robot_error`, `feels`, `ft_sensor`, `assumed_robot_error`: as of `APOReplay-v0`. A robot that feels does all that it
-      does before the approach.
-    - `residual`: whether actions are added to the approach; False: they are all that moves the tip.
-    - `shift_mm`, `turn_deg`: of an action of 1.
-    - `horizon`: actions of an episode.
-    - `fails_above_n`: see above.
+    - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as in
+      `APOReplay-v0`.
+    - `operation`: numbered from 1; default: the last one.
+    - `corrector`: a corrector, or `uncorrected`, `oracle`, `nominal`.
+    - `robot_error`, `probe`, `ft_sensor`, `assumed_robot_error`: as in `APOReplay-v0`. The robot probes before the
+      approach.
+    - `residual`: whether actions are added to the approach; if not, they alone move the tip.
+    - `shift_mm`, `turn_deg`: translation and rotation of an action of 1.
+    - `horizon`: actions of an episode. Another one than 200 is also given to `gymnasium.make` as `max_episode_steps`.
+    - `fails_above_n`: force that ends an episode.
     - `reward`: `judge` or `progress`.
-    - `starts`: `training` or `evaluation`. Report what was reached from starts for evaluation.
-    - `layouts`, `first_trial`: the pool of starts for training.
-    - `pixels`: whether pictures are seen; they make a step slow.
+    - `starts`: `training` or `evaluation`: what `reset()` without a seed draws.
+    - `layouts`, `first_trial`: the pool of trials for training.
+    - `pixels`: whether observations have images, which makes a step slow.
     - `render_mode`: `rgb_array`.
 
-    What is privileged is in `env.unwrapped` alone: `trial`, `poses` of all parts, and `truth`, the true goals.
+    Privileged information is only in `env.unwrapped`: `trial`, `poses` of all parts, and `truth`, the true poses.
 
     ## Version History
     - v0: first version.
@@ -132,13 +137,13 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         arm: str | Arm = TrialConfig.arm,
         timestep_s: float = TrialConfig.timestep_s,
         robot_error: str = ROBOT_ERROR,
-        probing: bool = False,
+        probe: bool = False,
         ft_sensor: str = TrialConfig.ft_sensor,
         assumed_robot_error: str = TrialConfig.assumed_robot_error,
         residual: bool = True,
         shift_mm: float = 1.0,
         turn_deg: float = 0.5,
-        horizon: int = 200,
+        horizon: int = HORIZON,
         fails_above_n: float = 60.0,
         reward: str = "judge",
         layouts: int = 16,
@@ -160,11 +165,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         for name, count in (("horizon", horizon), ("layouts", layouts)):
             require(count > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         check("seed", first_trial)
-        check("human_error_scale", human_error_scale)
         self.render_mode = render_mode
         require(
             not isinstance(corrector, str) or "+" not in corrector,
-            f"the corrector '{corrector}' was given; what follows + is of whole replays, so give what is before it.",
+            f"the corrector '{corrector}' was given; an insertion takes a corrector without +spiral or +probe.",
         )
         known = {**CORRECTORS, **SIMULATED, **dict.fromkeys(_PLANS, "")}
         planner = corrector if corrector in _PLANS else resolve(corrector, known, "corrector")
@@ -172,43 +176,45 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         n = len(loaded.assembly)
         k = n if operation is None else operation
         require(k in range(1, n + 1), f"operation {operation} was given; {loaded.name} has 1 to {n}.")
-        self._trials = Trials(
-            build_scene(loaded, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s),
-            int(k) - 1,
-            human_error_scale,
-            make_noise(USUAL if noise is None else noise, NoiseLevel(*noise_pair(noise_level, "noise"))),
-            planner,
-            RobotSettings(robot_error, probing, ft_sensor, assumed_robot_error).checked(),
+        scene = build_scene(loaded, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s)
+        self._scenes = Scenes(scene)
+        self._model = USUAL if noise is None else noise
+        level = NoiseLevel(*noise_pair(noise_level))
+        self._settings = EpisodeSettings(level, human_error_scale, clearance_mm)
+        robot = RobotSettings(robot_error, probe, ft_sensor, assumed_robot_error).checked()
+        self._trials = self._usual = Trials(
+            scene, int(k) - 1, human_error_scale, make_noise(self._model, level), planner, robot
         )
         self._residual = bool(residual)
         self.scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
-        """Of an action of 1, [m, rad]."""
+        """Translation and rotation of an action of 1, (6,), [m, rad]."""
         self._horizon = int(horizon)
         self._fails_above_n = fails_above_n
         self.share = float(reward == "progress")
-        """Of the way in, as a reward."""
+        """The share of the reward that is for progress."""
         self._layouts = int(layouts)
         self._first = int(first_trial)
         self._evaluates = starts == "evaluation"
         self._pixels = bool(pixels)
-        self._pool: dict[int, Begun | Outcome] = {}
-        self._begun: Begun | None = None
+        self._pool: dict[int, EpisodeStart | Outcome] = {}
+        self._begun: EpisodeStart | None = None
         self._control: TipControl | None = None
         self._wrist_seed = 0
         self._actions: list[Action] = []
         self._over = True
+        self._out_of_time = False
         self._best = 0.0
         self.observation_space = insert_space(self._pixels)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
 
     @property
     def trial(self) -> int:
-        """The number of the trial of this episode: whoever sees it can draw the truth."""
+        """The number of the trial of this episode, which determines its truth."""
         return self._now().trial
 
     @property
     def truth(self) -> Array:
-        """The true goals up to this operation, (k, 4, 4), world frame, [m]."""
+        """The true poses up to this operation, (k, 4, 4), world frame, [m]."""
         return self._now().reference
 
     @property
@@ -218,7 +224,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     @property
     def off(self) -> Array:
-        """By how much the part is really off where it has to go, (6,), [m, rad], in the frame of the way in."""
+        """The true error of the part relative to its target, (6,), [m, rad], in the frame of the insertion axis."""
         return self._now().off(self._at_work())
 
     @property
@@ -232,41 +238,46 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return self._now().start.operation + 1
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Begin at one of the starts.
+        """Start at a trial; `seed=k` is trial k.
 
         Args:
-            options: `trial`: the number of the trial to begin with, and without a seed that of what is felt.
+            options: `trial`, and `noise_level`, `human_error_scale` and `clearance_mm` of this episode; default: those
+                of the environment.
 
         Raises:
-            InputError: Another option, a trial that never comes to the operation, or none of the pool does.
+            InputError: Another option, a value that is not allowed, or a trial that fails before the operation.
         """
-        trial = asked_options(options, ("trial",)).get("trial")
-        for number, called in ((seed, ""), (trial, "trial")):
-            if number is not None:
-                check("seed", number, called=called)
-        of_evaluation = self._evaluates and trial is None
-        if of_evaluation and seed is not None:
-            require(
-                seed < EVALUATION_STARTS,
-                f"a seed of {seed} was given to reset(); starts for evaluation have seeds below {EVALUATION_STARTS}.",
-            )
-        chance = trial if seed is None else seed
-        super().reset(seed=None if chance is None else int(chance))
+        asked = episode_options(options)
+        number = trial_number(seed, asked)
+        settings = replace_settings(self._settings, asked, NOISE_MODEL)
+        super().reset(seed=seed if seed is not None else number)
         self._over = True
-        self._begin(self._evaluation_start(seed) if of_evaluation else self._drawn(trial))
+        self._trials = self._usual if settings == self._settings else self._changed(settings)
+        if number is None and self._evaluates:
+            number = int(self.np_random.integers(EVALUATION_STARTS))
+        self._begin(self._drawn() if number is None else self._start_of(number))
         return self._seen(), {}
 
-    def _begin(self, begun: Begun) -> None:
-        """Take up a start."""
+    def _changed(self, settings: EpisodeSettings) -> Trials:
+        """The trials with other settings."""
+        return self._usual._replace(
+            scene=self._scenes.of(settings.clearance_mm),
+            human_error_scale=settings.human_error_scale,
+            noise=make_noise(self._model, settings.noise_level),
+        )
+
+    def _begin(self, begun: EpisodeStart) -> None:
+        """Begin an episode."""
         self._begun = begun
         self._wrist_seed = int(self.np_random.integers(2**63))
         self._actions = []
         self._control = None
         self._over = False
+        self._out_of_time = False
         self._best = self._at_work().begins
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Lead the tip for 50 ms, or let go.
+        """Move the tip for 50 ms, or open the hand.
 
         Raises:
             ResetNeeded: The episode is over, or there is none.
@@ -285,14 +296,17 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         before = self._best
         shared = 0.0
         try:
-            self._lead(control, given)
-            self._best = min(before, -float(control.feel.tip[2]))
+            self._move(control, given)
+            self._best = min(before, -float(control.reading.tip[2]))
             shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
-        except Halt as halt:
-            info = self._said(halt.code, halt.part)
+        except ExecutionAborted as aborted:
+            info = self._ended_by(aborted.code, aborted.part)
         self._over = bool(info)
-        return self._seen(), shared + float(info.get("success", False)), self._over, False, info
+        truncated = self._over and self._out_of_time
+        info = info or {"success": False}
+        reward = shared + float(info["success"])
+        return self._seen(), reward, self._over and not truncated, truncated, info
 
     def render(self) -> Any:
         """Arm and parts, (480, 640, 3) of uint8."""
@@ -308,74 +322,68 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """All but the simulation, which is made again by the same actions."""
         return {**self.__dict__, "_control": None}
 
-    def _now(self) -> Begun:
+    def _now(self) -> EpisodeStart:
         if self._begun is None:
             raise gymnasium.error.ResetNeeded("there is no episode yet; call reset() first.")
         return self._begun
 
-    def _drawn(self, trial: int | None) -> Begun:
-        if trial is not None:
-            begun = self._trials.begin(int(trial))
-            if isinstance(begun, Outcome):
-                raise InputError(f"trial {trial} does not come to this operation: {begun.sentence}.")
-            return begun
+    def _drawn(self) -> EpisodeStart:
+        """A random trial of the pool for training that does not fail before the operation."""
+        pool = self._pool if self._trials is self._usual else {}
         why = ""
         for _ in range(MOST_TRIES):
             drawn = self._first + int(self.np_random.integers(self._layouts))
-            if drawn not in self._pool:
-                self._pool[drawn] = self._trials.begin(drawn)
-            found = self._pool[drawn]
-            if isinstance(found, Begun):
+            if drawn not in pool:
+                pool[drawn] = self._trials.begin(drawn)
+            found = pool[drawn]
+            if isinstance(found, EpisodeStart):
                 return found
             why = found.sentence
         raise InputError(
-            f"{MOST_TRIES} draws of {self._layouts} layouts did not come to this operation, the last one since "
-            f"{why}; give more layouts, a lower level or a smaller robot error."
+            f"{MOST_TRIES} draws from {self._layouts} layouts failed before this operation, the last one because "
+            f"{why}; use more layouts, a lower noise level or a smaller robot error."
         )
 
-    def _evaluation_start(self, seed: int | None) -> Begun:
-        """The first of the trials of a seed that comes to the operation; None draws the seed."""
-        first = int(self.np_random.integers(EVALUATION_STARTS)) if seed is None else int(seed)
+    def _start_of(self, number: int) -> EpisodeStart:
+        """The start of a trial, or of the first one of its replacements that does not fail before the operation."""
+        last = FIRST_TRAINING_TRIAL if number < EVALUATION_STARTS else number + 1
         why = ""
-        for number in range(first, FIRST_TRAINING_TRIAL, EVALUATION_STARTS):
-            begun = self._trials.begin(number)
-            if isinstance(begun, Begun):
+        for replacement in range(number, last, EVALUATION_STARTS):
+            begun = self._trials.begin(replacement)
+            if isinstance(begun, EpisodeStart):
                 return begun
             why = begun.sentence
-        raise InputError(
-            f"no trial of seed {first} comes to this operation, the last one since {why}; give a lower level."
-        )
+        raise InputError(f"trial {number} fails before this operation: {why}; use another one, or a lower noise level.")
 
     def _at_work(self) -> TipControl:
-        """The simulation of this episode, made anew after a reset and in a copy."""
+        """The simulation of this episode, which a reset and a copy make again."""
         begun = self._now()
         if self._control is None:
             rng = np.random.default_rng(self._wrist_seed)
             self._control = TipControl(self._trials.scene, begun.start, rng, self._residual)
             if not self._over:
                 for action in self._actions:
-                    self._lead(self._control, action)
+                    self._move(self._control, action)
         return self._control
 
-    def _lead(self, control: TipControl, action: Action) -> None:
+    def _move(self, control: TipControl, action: Action) -> None:
         control.act(*np.split(self.scale * action[:6].astype(np.float64), 2))
 
     def _end(self, control: TipControl, grip: float) -> dict[str, Any]:
-        """What is said at the end, or nothing if it goes on."""
+        """The `info` of the last step, or nothing if the episode goes on."""
         if control.force_n > self._fails_above_n:
-            return self._said("force_stop")
-        last = len(self._actions) == self._horizon
-        if not (last or grip > LETS_GO or (self._residual and control.arrived and grip >= -LETS_GO)):
-            return {}
-        return self._done(control, control.let_go())
+            return self._ended_by("force_stop")
+        opens = grip > RELEASE or (self._residual and control.arrived and grip >= -RELEASE)
+        self._out_of_time = not opens and len(self._actions) == self._horizon
+        return self._done(control, control.let_go()) if opens or self._out_of_time else {}
 
     def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
-        """What is said once the hand has let go."""
+        """The `info` after the hand opened."""
         begun = self._now()
         verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
-        return self._said("ok" if verdict.success else verdict.rests_on.code, why=verdict.rests_on.why)
+        return self._ended_by("ok" if verdict.success else verdict.rests_on.code, why=verdict.rests_on.why)
 
-    def _said(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
+    def _ended_by(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
         k = self._now().start.operation
         main = self._trials.scene.scenario.assembly.operations[k].main
         said = sentence(code, part=part or main, operation=k) + (f": {why}" if why else "")
@@ -383,7 +391,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     def _seen(self) -> Seen:
         actions = self._actions
-        seen = is_uncorrected(
+        seen = insert_observation(
             self._at_work(),
             self._now().covariance,
             self._best,
@@ -401,5 +409,5 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
 
 def ended(code: str, sentence: str) -> dict[str, Any]:
-    """What is said at the end."""
+    """The `info` of the last step."""
     return {"success": code == "ok", "is_success": code == "ok", "code": code, "sentence": sentence}

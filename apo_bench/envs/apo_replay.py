@@ -1,4 +1,4 @@
-"""The door for learners: `APOReplay-v0`. It is long, as the docstring of the class is its page for learners."""
+"""The environment `APOReplay-v0`; the docstring of the class is its page in the documentation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,14 +9,25 @@ import gymnasium
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Step
-from apo_bench.envs.episode import VERDICTS, Episode, Scenes, Settings, step_info, verdicts, watch_human, with_options
+from apo_bench.envs.episode import (
+    VERDICTS,
+    Episode,
+    EpisodeSettings,
+    Scenes,
+    episode_options,
+    replace_settings,
+    simulate_trial,
+    step_info,
+    trial_number,
+    verdicts,
+)
 from apo_bench.envs.rendering import FPS, MODES, Rendering
-from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
-from apo_bench.envs.starts import RobotSettings, carried_out
+from apo_bench.envs.robot import RobotSettings, execute_plan
+from apo_bench.envs.spaces import Action, Seen, action_space, moved, observation_entries, observation_space
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import (
     DEPTH_CAMERA,
     USUAL,
@@ -32,7 +43,7 @@ from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_scene, data_with_arm
 from apo_bench.trial.fitting import fitting_plan
-from apo_bench.trial.predicted_success import abstained, predict_success
+from apo_bench.trial.predicted_success import abstain, predict_success
 from apo_bench.trial.stages import (
     demonstration_failure,
     observation_failure,
@@ -50,72 +61,69 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     """Replay an observed assembly.
 
     ## Description
-    A human assembles a few parts on a table; a camera sees where each part was put, with an error. A robot arm with
-    a parallel gripper repeats the assembly. One reset is one noisy demonstration, one step is one whole replay.
+    A human assembles a few parts on a table; a camera observes the pose of each part with an error. A robot arm with a
+    parallel gripper repeats the assembly. One reset is one noisy demonstration, one step is one whole replay.
 
     ## Observation Space
-    A `Dict`, one entry per operation of the assembly, in their order:
+    A `Dict` with one entry per operation of the assembly, in their order:
 
-    - `goals`, `Box(n, 7)`: the pose of the moved part when the operation was over, (x, y, z, qw, qx, qy, qz),
-      world frame, [m].
-    - `covariance`, `Box(n, 6, 6)`: of the body twist by which each goal may be wrong, [m, rad].
-    - `seen`, `MultiBinary(n)`: whether the operation was seen at all.
+    - `poses`, `Box(n, 7)`: the pose of the moved part after the operation, (x, y, z, qw, qx, qy, qz), world frame, [m].
+    - `covariance`, `Box(n, 6, 6)`: of the error of each pose as a body twist, [m, rad].
+    - `observed`, `MultiBinary(n)`: whether the operation was observed at all.
 
-    Which faces touch is certain and stays the same: `env.unwrapped.assembly`. All of it as one typed object is
-    `env.unwrapped.seen`.
+    The contacts are certain and stay the same: `env.unwrapped.assembly`. `env.unwrapped.observation` is the whole
+    observation as one typed object.
 
     ## Action Space
     `Box(n, 6)`: a body twist (x, y, z, rx, ry, rz) per operation, [m, rad], in the frame of the moved part, within
-    0.1 m and 0.5 rad per axis. The robot is asked for `goal @ exp(twist)`; zeros replay what was seen.
+    0.1 m and 0.5 rad per axis. The target pose is `pose @ exp(twist)`; zeros replay the observed poses.
 
     ## Rewards
-    1.0 if the finished assembly is right, else 0.0.
+    1.0 if the finished assembly is correct, else 0.0.
 
     ## Starting State
-    The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
-    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial, which is
-    `env.unwrapped.trial` and never in `info`: whoever sees it can draw the truth. The parts stand where the
-    demonstration began.
+    Layout, human error and observation error are random. `reset(seed=k)` and `reset(options={"trial": k})` are trial k
+    of sweeps and of `apo-bench run --seed k`; `reset()` draws the number of a trial. It is `env.unwrapped.trial` and
+    never in `info`, since it determines the truth. The parts stand where the demonstration began.
 
-    `reset(options={...})` takes `noise_level`, `human_error_scale` and `clearance_mm`, with the meaning of the arguments below and for
-    that episode alone; any other key is refused, but for `lerobot_new_rollout`, which means nothing here.
+    `reset(options={...})` also takes `noise_level`, `human_error_scale` and `clearance_mm`, as the arguments below, for
+    that episode alone.
 
     ## Episode End
-    Every step terminates. `info` then holds `is_success` and, the same, `success`; `as_demonstrated` (each contact was
-    also made when and where it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of
-    `apo_bench.records.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
-    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`, and `predicted_success`, the
-    probability of success that it stated. Never the truth, and nothing from which it can be drawn.
-    A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
-    further step: code `time_limit`. Wall time has no limit.
-    A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
-    keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
+    Every step terminates. `info` then holds `success` (also as `is_success`), `as_demonstrated` (each contact was also
+    made when and where it was demonstrated), `loose_success`, `stage` and `code` (`done` and `ok`, or one of
+    `apo_bench.records.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was executed,
+    `failure_prediction` (`fails`, `operation`, `code`, `size_mm`) and `predicted_success`.
+    A replay of more than 1000 s of simulated time ends with code `time_limit`. Wall time has no limit.
+    `reset()` skips a demonstration that failed (at most one in a hundred). `reset(seed=k)` keeps it, with its code in
+    `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
     ## Arguments
-    - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
-    - `noise_level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
-    - `human_error_scale`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
-    - `noise`: a noise model by name, as `module:name`, or the object; None stands for `isotropic`.
-    - `pose_source`: `noise`, or `range`: poses are measured in depth images; `noise_level` is then the noise of a ray in mm, and
-      there is no noise model.
+    - `scenario`: a name (`apo-bench scenario list`), the path of a scenario file, or a `Scenario`.
+    - `noise_level`: standard deviation of the observed poses per axis, in mm and degrees; or the two as a pair.
+    - `human_error_scale`: factor on the human error that the scenario states; 0 is an ideal human.
+    - `noise`: a noise model by name, as `module:name`, or the object; default: `isotropic`.
+    - `pose_source`: `noise-model`, or `depth-camera`: poses are estimated from simulated depth images; `noise_level` is
+      then in mm per ray, and there is no noise model.
     - `grasp`: `friction`, or `weld` for an ideal gripper.
-    - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
+    - `clearance_mm`: per side, between parts that fit; default: the scenario's.
     - `arm`: by name, or an `Arm`.
-    - `timestep_s`: of the physics.
-    - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
-    - `feels`: whether the robot finds out by touching how wrong it is itself, as with the methods `METHOD+probe`.
-    - `ft_sensor`: the force and torque sensor at its wrist, `external` or another name or noise, if it feels.
-    - `assumed_robot_error`: how wrong it is said to be, `drawn`, `unstated`, or standard deviations, if it feels.
-    - `max_reobservations`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
-    - `min_predicted_success`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
-      `promise`, code `abstained`. 0 carries out everything.
-    - `fidelity`: `full`, or `near-contact`, which simulates only where parts may touch: a third of the time.
-    - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
-      display; `rgb_array_list` the pictures of the whole replay; `human` opens a window when the replay begins.
+    - `timestep_s`: time step of the physics.
+    - `robot_error`: standard deviations of the robot's own errors: `none`, or `hand_eye:1/0.2+tool:0.5`.
+    - `probe`: whether the robot probes fixed surfaces to estimate its own calibration error, as methods with `+probe`.
+    - `ft_sensor`: the force-torque sensor of a robot that probes, `wrist`, another name, or its noise.
+    - `assumed_robot_error`: what a robot that probes assumes: `matched`, `unknown`, or standard deviations.
+    - `max_reobservations`: how often `env.unwrapped.reobserve(operations)`, or a corrector, may observe operations
+      again.
+    - `min_predicted_success`: a plan with a lower predicted success is not executed: reward 0, stage `promise`, code
+      `abstained`. 0 executes every plan.
+    - `fidelity`: `full`, or `near-contact`, which simulates only where parts may touch, in a third of the time.
+    - `render_mode`: `rgb_array` renders arm and parts before the step, and the end of the replay after it, without a
+      display; `rgb_array_list` the frames of the replay; `human` opens a window when the replay begins.
 
     ## Copies
-    An environment can be pickled and copied (`copy.deepcopy`) at any time, and the copy goes on exactly as the original
-    would. The window of the mode `human` is not copied; a noise model of one's own must be picklable itself.
+    An environment can be pickled and copied (`copy.deepcopy`) at any time. The copy continues exactly as the original
+    does, without the window of the mode `human`; your own noise model must be picklable.
 
     ## Version History
     - v0: first version.
@@ -136,7 +144,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         pose_source: str = TrialConfig.pose_source,
         max_reobservations: int = TrialConfig.max_reobservations,
         robot_error: str = TrialConfig.robot_error,
-        probing: bool = False,
+        probe: bool = False,
         ft_sensor: str = TrialConfig.ft_sensor,
         assumed_robot_error: str = TrialConfig.assumed_robot_error,
         min_predicted_success: float = TrialConfig.min_predicted_success,
@@ -152,17 +160,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         check("min_predicted_success", min_predicted_success)
         check("fidelity", fidelity)
         check_together(fidelity, grasp)
-        self._abstain = min_predicted_success
+        self._min_predicted_success = min_predicted_success
         self._fidelity = fidelity
-        self._robot = RobotSettings(robot_error, probing, ft_sensor, assumed_robot_error).checked()
-        check_grip(self._robot.probing, grasp)
+        self._robot = RobotSettings(robot_error, probe, ft_sensor, assumed_robot_error).checked()
+        check_grip(self._robot.probe, grasp)
         self.render_mode = render_mode
         if pose_source == DEPTH_CAMERA and noise is not None:
             refuse_noise(noise)
-        self._eye = pose_source
+        self._pose_source = pose_source
         self._model = USUAL if noise is None else noise
         self._allowed = max_reobservations
-        self._usual = self._now = Settings(
+        self._usual = self._now = EpisodeSettings(
             NoiseLevel(*noise_pair(noise_level, pose_source)), human_error_scale, clearance_mm
         )
         self._noise = self._usual_noise = make_noise(self._model, self._usual.noise_level)
@@ -185,28 +193,26 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._scene.scenario.assembly
 
     @property
-    def seen(self) -> Observation:
-        """What was seen in this episode, as one typed object.
+    def observation(self) -> Observation:
+        """The observation of this episode, as one typed object.
 
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        return self._current("nothing was seen").seen
+        return self._current("nothing was observed").observation
 
     @property
-    def look(self) -> Looks | None:
-        """Sees operations of this episode again, as often as `max_reobservations` says; None if it says 0.
+    def reobserve(self) -> Reobservations | None:
+        """Observes operations of this episode again, `max_reobservations` times; None if that is 0.
 
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        return self._current("nothing was seen").look if self._allowed else None
+        return self._current("nothing was observed").reobserve if self._allowed else None
 
     @property
     def trial(self) -> int:
-        """The number of the trial of this episode, for whoever watches a learner: not for the learner.
-
-        Anybody can draw the truth of a trial from its number.
+        """The number of the trial of this episode, which determines its truth; not for policies.
 
         Raises:
             ResetNeeded: There is no episode yet.
@@ -219,36 +225,36 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._episode
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration; `seed=k` is trial k.
+        """Observe another demonstration; `seed=k` is trial k.
 
         Args:
-            options: `noise_level`, `human_error_scale` and `clearance_mm` of this episode; what is not said is as the environment was
-                made.
+            options: `trial`, and `noise_level`, `human_error_scale` and `clearance_mm` of this episode; default: those
+                of the environment.
 
         Raises:
-            InputError: Another option, a value that is not allowed, or no demonstration comes out right.
+            InputError: Another option, a value that is not allowed, or no demonstration succeeds.
         """
-        if seed is not None:
-            check("seed", seed)
-        self._set(with_options(self._usual, options, self._eye))
-        super().reset(seed=seed)
+        asked = episode_options(options)
+        number = trial_number(seed, asked)
+        self._set(replace_settings(self._usual, asked, self._pose_source))
+        super().reset(seed=seed if seed is not None else number)
         self._over = True
-        trial, simulated = watch_human(self._scene, self._now.human_error_scale, self._eye, seed, self.np_random)
-        noise = (
-            range_sensor(self._scene, simulated, self._now.noise_level.mm) if self._eye == DEPTH_CAMERA else self._noise
-        )
-        seen = observe_demonstration(simulated, noise, trial)
-        look = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
-        self._episode = Episode(trial, replace(simulated, images=None), seen, look)
-        self.aim(seen.poses)
-        self._refused = observation_failure(seen)
+        source, scale = self._pose_source, self._now.human_error_scale
+        trial, simulated = simulate_trial(self._scene, scale, source, number, self.np_random)
+        measured = source == DEPTH_CAMERA
+        noise = range_sensor(self._scene, simulated, self._now.noise_level.mm) if measured else self._noise
+        observation = observe_demonstration(simulated, noise, trial)
+        reobserve = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
+        self._episode = Episode(trial, replace(simulated, images=None), observation, reobserve)
+        self.aim(observation.poses)
+        self._refused = observation_failure(observation)
         self._over = False
         self._rendering.begin(simulated.layout.start)
-        return as_seen_entries(seen), {"demonstration": simulated.demonstration.code}
+        return observation_entries(observation), {"demonstration": simulated.demonstration.code}
 
     @check_arguments
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Replay the goals, each moved by its twist.
+        """Replay the target poses, each moved by its twist.
 
         Raises:
             ResetNeeded: The episode is over, or there is none.
@@ -260,56 +266,54 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._over = True
         said, end, predicted, predicted_success = self._replayed(plan)
         info = step_info(said, end, predicted, predicted_success)
-        return as_seen_entries(self.seen), float(said["is_success"]), True, False, info
+        return observation_entries(self.observation), float(said["is_success"]), True, False, info
 
     def aim(
         self,
-        goals: Array,
+        target_poses: Array,
         schedule: Sequence[Step] = (),
-        targets: Array | None = None,
+        step_poses: Array | None = None,
         correction: Correction | None = None,
     ) -> None:
-        """Replay this on zeros, until the next reset; for wrappers.
+        """Replay this plan on zeros, until the next reset; for wrappers.
 
         Args:
-            goals: (n, 4, 4), where every operation puts its part in the end.
-            schedule: What to do and undo; empty stands for every operation once, in order.
-            targets: (steps, 4, 4), as in `apo_bench.assembly.goals.Plan`; None stands for `goals` throughout.
-            correction: What the goals come from, so that what it doubts is in what the plan promises.
+            target_poses, schedule, step_poses: As in `Plan`; default: every operation once, in order.
+            correction: The correction that the poses come from; the predicted success takes its covariance.
         """
-        plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
-        self._aim = plan if targets is None else replace(plan, step_poses=targets)
+        plan = Plan(self.assembly, self.observation.start, target_poses, tuple(schedule))
+        self._aim = plan if step_poses is None else replace(plan, step_poses=step_poses)
         self._correction = correction
         self._refused = None
 
     def planned(self, correction: Correction) -> Plan:
-        """What the robot is to do after a correction of what was seen, as in a trial; for wrappers.
+        """The plan of a correction of the observation, as in a trial; for wrappers.
 
         Raises:
             InputError: The correction did not converge.
         """
-        return fitting_plan(correction, self.seen, self._scene).plan
+        return fitting_plan(correction, self.observation, self._scene).plan
 
     def refuse(self, code: str, why: str) -> None:
-        """Do not replay at all: the next step fails at stage `correct`; for wrappers."""
+        """Let the next step fail at stage `correct`, without a replay; for wrappers."""
         self._refused = Outcome("correct", code, None, why)
 
     def render(self) -> Any:
-        """The scene as an array (480, 640, 3) of uint8; in mode `rgb_array_list` those of the replay, (240, 320, 3), in
-        `human`, which shows the replay itself, None.
+        """The scene, (480, 640, 3) of uint8; the frames of the replay, (240, 320, 3), in mode `rgb_array_list`; None in
+        mode `human`.
         """
         return self._rendering.shown(self._scene, self.render_mode)
 
     def mujoco_data(self) -> Any:
-        """What the mode `rgb_array` shows, as a new `mujoco.MjData`; it holds the truth."""
+        """The state that the mode `rgb_array` renders, a new `mujoco.MjData`; it holds the truth."""
         return data_with_arm(self._scene, self._rendering.poses, self._rendering.state)
 
     def close(self) -> None:
         """Close the window, if one is open."""
         self._rendering.close()
 
-    def _set(self, now: Settings) -> None:
-        """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
+    def _set(self, now: EpisodeSettings) -> None:
+        """Take the noise and the scene of these settings, or raise an `InputError` and change nothing."""
         noise = (
             self._usual_noise
             if now.noise_level == self._usual.noise_level
@@ -320,7 +324,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._noise = noise
 
     def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None, float | None]:
-        """The verdicts, where it ended, what the plan had said, and how likely it had called its success."""
+        """The verdicts, how the replay ended, its failure prediction and its predicted success."""
         episode = self._current("there is no trial")
         simulated = episode.simulated
         failed = dict.fromkeys(VERDICTS, False)
@@ -329,13 +333,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._refused is not None:
             return failed, self._refused, None, None
         robot = self._robot
-        predicted = predicted_outcome(plan, self._scene, robot.probing)
-        told = robot.robot_error, robot.probing, robot.probing
-        predicted_success = predict_success(plan, self.seen, self._correction, self._scene, *told)
-        if predicted_success < self._abstain:
-            return failed, abstained(predicted_success, self._abstain), predicted, predicted_success
+        predicted = predicted_outcome(plan, self._scene, robot.probe)
+        drawn = robot.robot_error, robot.probe, robot.probe
+        predicted_success = predict_success(plan, self.observation, self._correction, self._scene, *drawn)
+        if predicted_success < self._min_predicted_success:
+            failure = abstain(predicted_success, self._min_predicted_success)
+            return failed, failure, predicted, predicted_success
         watch = self._rendering.watch(self._scene, self.render_mode)
-        attempt = carried_out(robot, plan, self._scene, simulated.layout.poses, episode.trial, watch, self._fidelity)
+        attempt = execute_plan(robot, plan, self._scene, simulated.layout.poses, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
             self._rendering.poses = attempt.result.reached.final.poses
         return verdicts(attempt.verdict), trial_outcome(attempt), predicted, predicted_success

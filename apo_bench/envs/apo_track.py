@@ -1,4 +1,4 @@
-"""Tracking (Section 4.2 of the paper) as a decision process: `APOTrack-v0`."""
+"""The environment `APOTrack-v0`: tracking (Section 4.2 of the paper) as a decision process."""
 
 from typing import Any, final
 
@@ -11,7 +11,7 @@ from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
-from apo_bench.envs.tracking import Act, Policy, Tracked, exactly_at, first_seen
+from apo_bench.envs.tracking import Act, Policy, Tracked, observe_first, reach_exactly
 from apo_bench.errors import InputError, shown
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
@@ -27,36 +27,37 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
     """Follow a human, operation by operation.
 
     ## Description
-    The robot sees an operation of a human, with an error, and does it; then it sees the next one. When contacts show
-    that an earlier operation was done at a wrong place, it can take the work apart, back to that one, and build it
-    again. In the end the whole of it is replayed, undone steps and all, and judged.
+    The robot observes an operation of a human with an error and does it; then it observes the next one. When contacts
+    show that an earlier operation was done at a wrong pose, it can undo operations back to that one and do them again.
+    At the end the whole schedule is replayed, with the undone steps, and judged.
 
     ## Observation Space
-    A `Dict` for n operations: `goals`, `covariance` and `seen` as of `APOReplay-v0`, of what was not shown yet
-    identities and zeros; `shown`, `MultiBinary(n)`: the operations that were shown; `done`, `MultiBinary(n)`: those
-    that are done; `placed`, `Box(n, 7)`: the goals at which they were done, of others as `goals`.
+    A `Dict` for n operations: `poses`, `covariance` and `observed` as in `APOReplay-v0`, with identities and zeros for
+    operations that were not shown yet; `shown`, `MultiBinary(n)`: the operations that were shown; `done`,
+    `MultiBinary(n)`: those that are done; `placed`, `Box(n, 7)`: the poses at which they were done, of others as
+    `poses`.
 
     ## Action Space
     A `Dict`: `act`, `Discrete(3)`: 0 do the next operation, 1 undo the last one that is done, 2 finish; and `twist`,
-    `Box(6)`, [m, rad], within 0.1 m and 0.5 rad: the next operation is done at `goal @ exp(twist)`, for the goal as it
-    was seen. `info["action_mask"]`, (3,) of int8, says which acts are possible; another one changes nothing.
-    Finishing before all is done gives up.
+    `Box(6)`, [m, rad], within 0.1 m and 0.5 rad: the next operation is done at `pose @ exp(twist)` of its observed
+    pose. `info["action_mask"]`, (3,) of int8, marks the acts that are possible; another one changes nothing. An episode
+    that finishes before all operations are done fails.
 
     ## Rewards
-    0.0 on the way; at the end 1.0 if the assembly is right, else 0.0. With `replay` it is the judge's word on a replay
-    of the whole schedule; without, the judge's rule on parts that stand exactly where they were asked to, which is
-    quicker and does not ask whether a robot can bring them there.
+    0.0 until the end, then 1.0 if the assembly is correct, else 0.0. With `replay` the judge decides on a replay of the
+    whole schedule; without, on parts that stand exactly at the poses where they were put, which is faster and ignores
+    whether a robot can bring them there.
 
     ## Starting State
-    As of `APOReplay-v0`: `reset(seed=k)` is trial k. The first operation was shown, nothing is done.
+    As in `APOReplay-v0`, with its options. The first operation was shown, none is done.
 
     ## Episode End
     It terminates when it is finished, and is truncated after 2 n^2 acts. The last `info` is that of `APOReplay-v0`.
 
     ## Arguments
-    - `scenario`: as of `APOReplay-v0`.
-    - `replay`: whether the end is replayed.
-    - all others: as of `APOReplay-v0`.
+    - `scenario`: as in `APOReplay-v0`.
+    - `replay`: whether the schedule is replayed at the end.
+    - all others: as in `APOReplay-v0`.
 
     ## Version History
     - v0: first version.
@@ -73,17 +74,17 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         self.observation_space, self.action_space = track_spaces(n)
         self._placed: Array = np.zeros((0, 4, 4))
         self._schedule: list[Step] = []
-        self._targets: list[Array] = []
+        self._step_poses: list[Array] = []
         self._done = self._shown = self._acts = 0
         self._over = True
 
     @check_arguments
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration; `seed=k` is trial k."""
+        """Observe another demonstration; `seed=k` is trial k."""
         super().reset(seed=seed)
         _, info = self._base.reset(seed=seed, options=options)
-        self._placed = np.array(self._base.seen.poses)
-        self._schedule, self._targets = [], []
+        self._placed = np.array(self._base.observation.poses)
+        self._schedule, self._step_poses = [], []
         self._done = self._acts = 0
         self._shown = min(1, len(self._placed))
         self._over = False
@@ -110,69 +111,71 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
             reward, info = self._judged()
             return self._entries(), reward, True, False, {**info, "action_mask": self._mask()}
         if self._mask()[act]:
-            self._carry_out(act == UNDO, action["twist"])
+            self._do(act == UNDO, action["twist"])
         self._over = self._acts >= self._most
         return self._entries(), 0.0, False, self._over, {"action_mask": self._mask()}
 
     @property
     def tracked(self) -> Tracked:
-        """What is known, as one typed object, for a policy that is asked when one more operation was shown."""
+        """The operations shown so far as one typed object, for a policy."""
         m = self._shown
-        return Tracked(first_seen(self._base.seen, m), self._placed[:m].copy())
+        return Tracked(observe_first(self._base.observation, m), self._placed[:m].copy())
 
     @property
     def schedule(self) -> tuple[Step, ...]:
-        """What was done and undone."""
+        """The steps so far."""
         return tuple(self._schedule)
 
     @property
     def placed(self) -> Array:
-        """(n, 4, 4): the goals at which operations were done last; those that were seen, where they never were."""
+        """(n, 4, 4): the poses at which operations were done last; the observed poses of those that never were."""
         return self._placed.copy()
 
     def action(self, act: Act) -> dict[str, Any]:
-        """The action that is this act now."""
-        goal = self._base.seen.poses[self._done - act.undo]
+        """The action that does this act."""
+        goal = self._base.observation.poses[self._done - act.undo]
         twist = np.zeros(6) if act.undo else pose.log(pose.inverse(goal) @ act.target)
         return {"act": UNDO if act.undo else DO, "twist": twist}
 
     def render(self) -> Any:
-        """As of `APOReplay-v0`."""
+        """As in `APOReplay-v0`."""
         return self._base.render()
 
     def close(self) -> None:
         """Close the window, if one is open."""
         self._base.close()
 
-    def _carry_out(self, undo: bool, twist: Array) -> None:
+    def _do(self, undo: bool, twist: Array) -> None:
         self._done -= undo
         k = self._done
         if not undo:
-            self._placed[k] = self._base.seen.poses[k] @ pose.exp(twist)
+            self._placed[k] = self._base.observation.poses[k] @ pose.exp(twist)
             self._done += 1
             self._shown = min(max(self._shown, self._done + 1), len(self._placed))
         self._schedule.append(Step(k, undo))
-        self._targets.append(self._placed[k].copy())
+        self._step_poses.append(self._placed[k].copy())
 
     def _judged(self) -> tuple[float, dict[str, Any]]:
         if self._done < len(self._placed):
-            return _said(dict.fromkeys(VERDICTS, False), Outcome("judge", "not_made", self._done, sentence("not_made")))
+            return _end_info(
+                dict.fromkeys(VERDICTS, False), Outcome("judge", "not_made", self._done, sentence("not_made"))
+            )
         if not self._replay:
             return _judged_at(
-                self._placed, self._base.seen, self._base._current("").simulated, self._base._scene.criteria
+                self._placed, self._base.observation, self._base._current("").simulated, self._base._scene.criteria
             )
-        self._base.aim(self._placed, self._schedule, np.array(self._targets))
+        self._base.aim(self._placed, self._schedule, np.array(self._step_poses))
         _, reward, _, _, info = self._base.step(np.zeros((len(self._placed), 6)))
         return reward, info
 
     def _mask(self) -> NDArray[np.int8]:
-        """Which acts are possible: none once it is over."""
+        """The acts that are possible: none after the end."""
         possible = self._done < self._shown, self._done > 0, True
         return np.array([each and not self._over for each in possible], dtype=np.int8)
 
     def _entries(self) -> Seen:
         n = len(self._placed)
-        seen: Observation = self._base.seen
+        seen: Observation = self._base.observation
         shown = np.arange(n) < self._shown
         done = np.arange(n) < self._done
         goals = np.where(shown[:, None, None], seen.poses, np.eye(4))
@@ -189,16 +192,16 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 def _judged_at(
     goals: Array, seen: Observation, simulated: SimulatedDemonstration, criteria: Criteria
 ) -> tuple[float, dict[str, Any]]:
-    """What the judge says of parts that stand exactly at these goals."""
+    """The verdict on parts that stand exactly at these poses."""
     if simulated.demonstration.code != "ok":
-        return _said(dict.fromkeys(VERDICTS, False), demonstration_failure(simulated.demonstration))
-    reached = exactly_at(seen, goals)
+        return _end_info(dict.fromkeys(VERDICTS, False), demonstration_failure(simulated.demonstration))
+    reached = reach_exactly(seen, goals)
     verdict = judge(seen.assembly, reached, simulated.layout.poses, criteria)
     there = ReplayResult(reached, Outcome("done", "ok", None, sentence("ok")), 0.0, 0.0)
-    return _said(verdicts(verdict), trial_outcome(Attempt(there, verdict)))
+    return _end_info(verdicts(verdict), trial_outcome(Attempt(there, verdict)))
 
 
-def _said(verdicts: dict[str, bool], end: Outcome) -> tuple[float, dict[str, Any]]:
+def _end_info(verdicts: dict[str, bool], end: Outcome) -> tuple[float, dict[str, Any]]:
     return float(verdicts["is_success"]), step_info(verdicts, end, None, None)
 
 

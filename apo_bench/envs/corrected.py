@@ -1,4 +1,4 @@
-"""The with-correction arm of an experiment: a wrapper that corrects what `APOReplay-v0` shows."""
+"""A wrapper that corrects the observed poses of `APOReplay-v0`."""
 
 from collections.abc import Callable
 from typing import Any, final
@@ -16,12 +16,12 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 @final
 @check_arguments
 class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
-    """Correct what was seen, at every reset: the with-correction arm of an experiment.
+    """Correct the observed poses at every reset.
 
-    The observation then holds the corrected goals, with what contacts leave free chosen so that they fit, as in trials;
-    zeros replay them, and an action composes on top. A correction
-    that does not converge is not executed: the step ends with reward 0 at stage `correct`. One that takes work apart
-    again is executed with its schedule; the twist of an operation then acts on every target of that operation.
+    The observation holds the corrected poses, with the directions that contacts leave free chosen as in trials. Zeros
+    replay them, and an action is applied on top. If a correction does not converge, the step ends with reward 0 at
+    stage `correct`. A correction that undoes operations is executed with its schedule; the twist of an operation then
+    applies to every step of it.
     """
 
     def __init__(self, env: gymnasium.Env[Seen, Action], corrector: str | Callable[..., Any] = CORRECTOR) -> None:
@@ -47,27 +47,27 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
                 f"the corrector {corrector!r} was given; give a name, 'package.module:name' or a function."
             )
         self._correct = correct
-        self._goals: Array | None = None
+        self._poses: Array | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration and correct it."""
+        """Observe another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
-        correction = self._correct(self._base.seen, self._corrector, self._base.look)
-        goals = correction.poses
+        correction = self._correct(self._base.observation, self._corrector, self._base.reobserve)
+        poses = correction.poses
         if correction.ok:
             plan = self._base.planned(correction)
-            goals = plan.target_poses
-            self._base.aim(goals, plan.schedule, plan.step_poses, correction)
+            poses = plan.target_poses
+            self._base.aim(poses, plan.schedule, plan.step_poses, correction)
         else:
             self._base.refuse(correction.status, correction.sentence)
-        self._goals = packed(goals)
-        return self._with_goals(seen), {**info, "correction": correction.status}
+        self._poses = packed(poses)
+        return self._with_poses(seen), {**info, "correction": correction.status}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Replay the corrected goals, each moved by its twist."""
+        """Replay the corrected poses, each moved by its twist."""
         seen, reward, terminated, truncated, info = self.env.step(action)
-        return self._with_goals(seen), float(reward), terminated, truncated, info
+        return self._with_poses(seen), float(reward), terminated, truncated, info
 
-    def _with_goals(self, seen: Seen) -> Seen:
-        assert self._goals is not None
-        return {**seen, "poses": self._goals.copy()}
+    def _with_poses(self, seen: Seen) -> Seen:
+        assert self._poses is not None
+        return {**seen, "poses": self._poses.copy()}

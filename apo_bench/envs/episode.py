@@ -1,12 +1,6 @@
-"""One episode: its settings, which `reset(options=...)` may say, its scene, and what was seen in it.
+"""One episode of an environment: its settings, its scene, its observation, and what `info` says at its end."""
 
-What an environment says in `info`, where a number may be missing.
-
-A vector environment gathers the infos of its environments into arrays. If the first has an `int` it makes an array
-that holds nothing but ints, and a None of the next one raises; numbers of these types go into an array of objects.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
@@ -15,27 +9,31 @@ import numpy as np
 from apo_bench.assembly import Observation, Outcome
 from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import Predicted, check, noise_pair
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 MOST_SCENES = 8
-"""So many compiled scenes of other clearances are kept."""
+"""Compiled scenes of other clearances that are kept."""
 MOST_TRIES = 30
-"""So many demonstrations in a row may go wrong before `reset()` gives up."""
+"""Failed demonstrations in a row after which `reset()` gives up."""
 
 
 @final
 @dataclass(frozen=True)
-class Settings:
-    """What may differ from episode to episode; checked when it is made."""
+class EpisodeSettings:
+    """The settings that may differ between episodes.
+
+    Raises:
+        InputError: A number that is not allowed.
+    """
 
     noise_level: NoiseLevel
     human_error_scale: float
     clearance_mm: float | None
-    """None stands for the scenario's."""
+    """Default: the scenario's."""
 
     def __post_init__(self) -> None:
         check("human_error_scale", self.human_error_scale)
@@ -46,81 +44,97 @@ class Settings:
 @final
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """One trial as it was demonstrated and seen."""
+    """One trial, demonstrated and observed."""
 
     trial: int
     simulated: SimulatedDemonstration
     """Without its images."""
-    seen: Observation
-    look: Looks | None
-    """None where no looks are allowed."""
+    observation: Observation
+    reobserve: Reobservations | None
+    """None where no reobservation is allowed."""
 
 
 _OF_TOOLS = frozenset({"lerobot_new_rollout"})
-"""Options that evaluation tools pass to every environment; they mean nothing here."""
-_OPTIONS = tuple(field.name for field in fields(Settings))
+"""Options that evaluation tools pass to every environment; they have no effect."""
+_OPTIONS = ("trial", *(field.name for field in fields(EpisodeSettings)))
 
 
-def asked_options(options: object, allowed: Sequence[str]) -> dict[str, Any]:
-    """What is asked of `reset()`, without what evaluation tools pass to every environment.
+def episode_options(options: object) -> dict[str, Any]:
+    """The options of `reset()`, without those that evaluation tools pass to every environment.
 
     Raises:
-        InputError: No dict, or an option that there is not.
+        InputError: Not a dict, or an unknown option.
     """
     if options is None:
         return {}
     if not isinstance(options, Mapping):
         raise InputError(
-            f"{shown(options)} was given as options of reset(); a dict with {', '.join(allowed)} is allowed."
+            f"{shown(options)} was given as options of reset(); a dict with {', '.join(_OPTIONS)} is allowed."
         )
     asked = {name: value for name, value in options.items() if name not in _OF_TOOLS}
     for name in asked:
-        if name not in allowed:
-            raise InputError(unknown("option of reset()", str(name), allowed))
+        if name not in _OPTIONS:
+            raise InputError(unknown("option of reset()", str(name), _OPTIONS))
     return asked
 
 
-def with_options(usual: Settings, options: object, pose_source: str) -> Settings:
-    """The settings of an episode: the usual ones, but for what the options say.
+def trial_number(seed: int | None, asked: Mapping[str, Any]) -> int | None:
+    """The number of the trial, from the seed or the option `trial`; None where neither is given.
 
     Raises:
-        InputError: An option that there is not, or a value that is not allowed.
+        InputError: A number that is not allowed.
     """
-    changes = asked_options(options, _OPTIONS)
+    if seed is not None:
+        check("seed", seed)
+    trial = asked.get("trial")
+    if trial is None:
+        return seed
+    check("seed", trial, called="trial")
+    return int(trial)
+
+
+def replace_settings(usual: EpisodeSettings, asked: Mapping[str, Any], pose_source: str) -> EpisodeSettings:
+    """The settings of an episode: the usual ones with those that the options change.
+
+    Raises:
+        InputError: A value that is not allowed.
+    """
+    changes = {name: value for name, value in asked.items() if name != "trial"}
     if "noise_level" in changes:
         changes["noise_level"] = NoiseLevel(*noise_pair(changes["noise_level"], pose_source))
     return replace(usual, **changes)
 
 
-def watch_human(
-    scene: Scene, human_error_scale: float, pose_source: str, seed: int | None, rng: np.random.Generator
+def simulate_trial(
+    scene: Scene, human_error_scale: float, pose_source: str, number: int | None, rng: np.random.Generator
 ) -> tuple[int, SimulatedDemonstration]:
-    """Trial `seed`, or the next one of those that are drawn whose demonstration is right.
+    """A trial and its demonstration: the one of this number, or else the first of random ones that succeeds.
 
     Raises:
-        InputError: None of `MOST_TRIES` is right.
+        InputError: `MOST_TRIES` demonstrations in a row failed.
     """
-    for _ in range(1 if seed is not None else MOST_TRIES):
-        trial = int(seed) if seed is not None else int(rng.integers(2**31))
+    for _ in range(1 if number is not None else MOST_TRIES):
+        trial = int(number) if number is not None else int(rng.integers(2**31))
         simulated = simulate_demonstration(scene, human_error_scale, trial, pose_source)
-        if seed is not None or simulated.demonstration.code == "ok":
+        if number is not None or simulated.demonstration.code == "ok":
             return trial, simulated
     raise InputError(
-        f"{MOST_TRIES} demonstrations of '{scene.scenario.name}' in a row went wrong at carelessness {human_error_scale:g} and "
-        f"{scene.clearance_mm:g} mm clearance; give less carelessness, or mend the scenario."
+        f"{MOST_TRIES} demonstrations of '{scene.scenario.name}' in a row failed with a human error scale of "
+        f"{human_error_scale:g} and {scene.clearance_mm:g} mm clearance; reduce the human error scale, or check the "
+        "scenario."
     )
 
 
 @final
 class Scenes:
-    """A scene, and the same compiled for other clearances."""
+    """A compiled scene, and the same scene compiled for other clearances."""
 
     def __init__(self, usual: Scene) -> None:
         self._usual = usual
         self._others: dict[float, Scene] = {}
 
     def of(self, clearance_mm: float | None) -> Scene:
-        """The scene of a clearance; None stands for the scenario's.
+        """The scene of a clearance; default: the scenario's.
 
         Raises:
             InputError: A part cannot have it.
@@ -143,40 +157,40 @@ class Scenes:
 
 
 VERDICTS = ("is_success", "as_demonstrated", "loose_success")
-"""Keys of what the judge says."""
+"""Keys of `info` that hold verdicts."""
 
 
 @final
 class NullableInt(int):
-    """A whole number beside which None may stand."""
+    """An integer where other environments of a vector may have None: NumPy gathers these into an array of objects."""
 
 
 @final
 class NullableFloat(float):
-    """A number beside which None may stand."""
+    """A number where other environments of a vector may have None."""
 
 
 def nullable(x: float | None) -> float | None:
-    """The number as one beside which None may stand."""
+    """The number in a type that a vector environment can gather together with None."""
     if x is None:
         return None
     return NullableInt(x) if isinstance(x, int) else NullableFloat(x)
 
 
 def predicted_info(predicted: Mapping[str, Any]) -> dict[str, Any]:
-    """What a plan said about itself, as in a row, fit for infos."""
+    """A failure prediction as in a record, for `info`."""
     return {**predicted, **{name: nullable(predicted[name]) for name in ("operation", "size_mm")}}
 
 
 def verdicts(verdict: Verdict) -> dict[str, bool]:
-    """What the judge says."""
+    """The verdicts by key."""
     return dict(zip(VERDICTS, (verdict.success, verdict.as_demonstrated, verdict.loose_success), strict=True))
 
 
 def step_info(
     verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None, predicted_success: float | None
 ) -> dict[str, Any]:
-    """What is said after a step: the verdicts, where the replay ended, and what the plan had said of itself."""
+    """`info` after the last step."""
     return {
         **verdicts,
         "success": verdicts["is_success"],

@@ -59,7 +59,7 @@ def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
     )
 
 
-def as_seen_entries(observation: Observation) -> Seen:
+def observation_entries(observation: Observation) -> Seen:
     """Fresh copies of what was seen."""
     return {
         "poses": packed(observation.poses),
@@ -115,7 +115,7 @@ def insert_space(pixels: bool) -> spaces.Dict:
     return spaces.Dict(seen)
 
 
-def is_uncorrected(
+def insert_observation(
     control: TipControl, covariance: Array, best: float, left: int, action: NDArray[np.float32]
 ) -> dict[str, Any]:
     """What is seen now, but for pictures.
@@ -126,7 +126,7 @@ def is_uncorrected(
         left: How many actions are left.
         action: (7,), the last one.
     """
-    feel = control.feel
+    feel = control.reading
     way = (-1e3 * float(feel.tip[2]), 1e3 * best, PERIOD_S * left)
     seen: dict[str, Any] = {
         "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],

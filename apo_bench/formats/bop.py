@@ -4,7 +4,6 @@ The first line is `scene_id,im_id,obj_id,score,R,t,time`; R is nine numbers row 
 """
 
 from array import array
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import check_separator, opened
+from apo_bench.io import opened
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 _NUMBERS = 14
@@ -46,12 +45,8 @@ class PoseRows:
 
     def spot(self, row: int) -> str:
         """Where a row stands, for messages."""
-        return f"{self.file}, {self.where_in_file(row)}"
-
-    def where_in_file(self, row: int) -> str:
-        """The line, or the entry of a JSON document."""
         place = self.place[row]
-        return str(place) if isinstance(place, str) else f"line {place}"
+        return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
 
 
 def read_results(path: str | Path) -> PoseRows:
@@ -61,9 +56,16 @@ def read_results(path: str | Path) -> PoseRows:
         InputError: Anything that is not as described, with the line where it stands.
     """
     numbers = array("d")
-    for line, text in _lines(path):
-        numbers.extend((line, *_row(text, f"{path}, line {line}")))
-    require(numbers, f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
+    with opened(path, "CSV file") as stream:
+        for line, raw in enumerate(stream, start=1):
+            text = raw.decode("utf-8-sig", "replace").strip()
+            place = f"{path}, line {line}"
+            if line == 1:
+                head = tuple(cell.strip() for cell in text.split(","))
+                require(head == _COLUMNS, f"{place}: the columns are {text[:80]}; needed are {','.join(_COLUMNS)}.")
+            elif text:
+                numbers.extend((line, *_row(text, place)))
+    require(numbers, f"{path}: no pose stands in the file; give a first line {','.join(_COLUMNS)}, and rows below it.")
     # Line, scene, image, object, score, R row by row, t, time: whole numbers of so many digits are exact.
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 4 + _NUMBERS)
     whole = cells[:, :4].astype(np.int64)
@@ -89,39 +91,11 @@ def check_rows(rows: PoseRows) -> PoseRows:
         f"{rows.spot(0)}, t: millimetres are needed, and the median distance to the camera is "
         f"{np.median(distance):.3g}; if these are metres, multiply by 1000.",
     )
-    _refuse_twice(rows)
-    return rows
-
-
-def _refuse_twice(rows: PoseRows) -> None:
-    """Refuse the first row that is an earlier one once more, number by number."""
     cells = np.concatenate([rows.where, rows.t_mm, rows.R.reshape(-1, 9)], axis=1)
-    _, first = np.unique(cells, axis=0, return_index=True)
-    again = np.setdiff1d(np.arange(len(cells)), first)
+    again = np.setdiff1d(np.arange(len(cells)), np.unique(cells, axis=0, return_index=True)[1])
     if again.size:
         raise InputError(f"{rows.spot(int(again[0]))}: an earlier row stands there once more; keep one of the two.")
-
-
-def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
-    """Number and text of every line below the first that is not empty."""
-    line = 0
-    try:
-        with opened(path, "CSV file") as stream:
-            for line, raw in enumerate(stream, start=1):
-                text = raw.decode("utf-8-sig").strip()
-                if line == 1:
-                    _check_header(text, f"{path}, line 1")
-                elif text:
-                    yield line, text
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
-    require(line, f"{path}: the file is empty; its first line is {','.join(_COLUMNS)}.")
-
-
-def _check_header(text: str, place: str) -> None:
-    columns = tuple(cell.strip() for cell in text.split(","))
-    check_separator(place, columns)
-    require(columns == _COLUMNS, f"{place}: the columns are {text[:80]}; needed are {','.join(_COLUMNS)}.")
+    return rows
 
 
 def _row(text: str, place: str) -> list[float]:

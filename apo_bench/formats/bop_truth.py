@@ -30,7 +30,7 @@ class TruthEntry(msgspec.Struct, frozen=True):
 def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) -> PoseRows:
     """The truth that estimates are compared with.
 
-    A `.json` file holds one scene, and does not say which: it is `scene`, else the number of its folder, else the only
+    A `.json` file holds one scene, and does not name it: it is `scene`, else the number of its folder, else the only
     scene that was estimated. It holds all images of that scene, so those with no estimate at all are left out, as they
     were probably not asked for. A folder holds scenes, as `000001/scene_gt.json`. Every row of a `.csv` file was asked
     for.
@@ -42,32 +42,27 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
         InputError: Anything that is not as described; no image of the truth has an estimate.
     """
     path = Path(path)
-    of_scenes = path.is_dir() or path.suffix.lower() == ".json"
+    is_results = path.suffix.lower() == ".csv"
     if path.is_dir():
         truth = _read_folder(path, scene)
-    elif of_scenes:
+    elif is_results:
+        truth = read_results(path)
+    else:
         scene = _which_scene(path, estimates) if scene is None else scene
         truth = _read_scene(path, scene)
-    else:
-        truth = read_results(path)
-    estimated_rows = _among(truth.where[:, :2], estimates.where[:, :2])
-    if scene is not None:
-        estimated_rows &= truth.where[:, 0] == scene
-    if not estimated_rows.any():
-        s, i = truth.where[0, :2]
-        raise InputError(
-            f"{path}: no image of {'the truth' if scene is None else f'scene {scene}'} has an estimate in "
-            f"{estimates.file}; the first of the truth is image {i} of scene {s}; give the truth of the "
-            "images that were estimated."
-        )
-    kept = estimated_rows if of_scenes else np.ones(len(estimated_rows), dtype=np.bool_)
-    if scene is not None:
-        kept &= truth.where[:, 0] == scene
-    truth = _only(truth, kept)
-    behind = truth.t_mm[:, 2] <= 0.0
-    if behind.any():
-        k = int(np.argmax(behind))
-        raise InputError(f"{truth.spot(k)}, t: the third number is the depth before the camera and must be above 0.")
+    kept = truth.where[:, 0] == (truth.where[:, 0] if scene is None else scene)
+    estimated = kept & _among(truth.where[:, :2], estimates.where[:, :2])
+    require(
+        estimated.any(),
+        f"{path}: no image of {'the truth' if scene is None else f'scene {scene}'} has an estimate in "
+        f"{estimates.file}; give the truth of the images that were estimated.",
+    )
+    truth = _only(truth, kept if is_results else estimated)
+    nearest = int(np.argmin(truth.t_mm[:, 2]))
+    require(
+        truth.t_mm[nearest, 2] > 0.0,
+        f"{truth.spot(nearest)}, t: the third number is the depth before the camera and must be above 0.",
+    )
     return truth
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Observation
 from apo_bench.errors import require
-from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
+from apo_bench.formats.deviations import SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io import Columns, CsvRow, check_quaternion, read_csv
 from apo_bench.scenario import Scenario, layout_at
@@ -41,16 +41,14 @@ _REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)
 _FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
 
 
-def read_table(
-    path: str | Path,
-    scenario: Scenario,
-    *,
-    deviation_mm: float = DEVIATION_MM,
-    deviation_deg: float = DEVIATION_DEG,
-) -> tuple[Observation, bool]:
-    """An observation from a CSV file, and whether a standard deviation had to be assumed.
+def read_table(path: str | Path, scenario: Scenario, assumed: tuple[float, float]) -> tuple[Observation, bool]:
+    """Read an observation from a CSV file; parts start where those of the scenario do.
 
-    Parts start where those of the scenario do.
+    Args:
+        assumed: The deviations, mm and degrees, of operations that state none.
+
+    Returns:
+        The observation, and whether a standard deviation had to be assumed.
 
     Raises:
         InputError: Anything in the file that is not as described, naming line and column.
@@ -64,8 +62,8 @@ def read_table(
     for k, operation in enumerate(assembly.operations):
         require(k in rows, f"{path}: the row of operation {k + 1} ({operation.main}) is missing.")
     ordered = [rows[k] for k in range(len(assembly))]
-    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
-    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
+    shift = [_deviation(row, "deviation", assumed[0] * 1e-3, SHIFT_M) for row in ordered]
+    turn = [_deviation(row, "turn deviation", math.radians(assumed[1]), TURN_RAD) for row in ordered]
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
     observation = Observation(
         assembly=assembly,

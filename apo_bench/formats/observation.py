@@ -1,4 +1,4 @@
-"""Read observed poses from a file: the JSON form of `apo_bench.formats.json_forms`, or comma-separated values."""
+"""Read observed poses from a file, JSON or comma-separated values."""
 
 from math import radians
 from pathlib import Path
@@ -9,9 +9,9 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation
 from apo_bench.errors import require
-from apo_bench.formats import json_reading
 from apo_bench.formats.csv_form import read_table
 from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
+from apo_bench.formats.observation_json import read_json_observation
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -32,7 +32,7 @@ def read_observation(
     deviation_mm: float = DEVIATION_MM,
     deviation_deg: float = DEVIATION_DEG,
 ) -> Observation:
-    """An observation from a `.csv` file, or from the JSON form of any other.
+    """Read an observation from a `.csv` file, or from the JSON form of any other.
 
     Args:
         scenario: The scenario it is of, its name, or its file.
@@ -52,45 +52,40 @@ def read_observation_file(
     deviation_mm: float | None = None,
     deviation_deg: float | None = None,
 ) -> ObservationFile:
-    """An observation from a file, with its scenario, and whether a standard deviation had to be assumed.
+    """Read an observation from a file, with its scenario, and whether a standard deviation had to be assumed.
 
     Args:
         deviation_mm, deviation_deg: As in `read_observation`; None stands for the default.
     """
     from apo_bench.scenario.file import load_scenario
 
-    deviation_mm = DEVIATION_MM if deviation_mm is None else deviation_mm
-    deviation_deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
-    check_deviations(deviation_mm, deviation_deg)
-    require(
-        isinstance(path, str | Path), f"{path!r} was given as an observation; give the path of a .csv or .json file."
+    assumed = (
+        DEVIATION_MM if deviation_mm is None else deviation_mm,
+        DEVIATION_DEG if deviation_deg is None else deviation_deg,
     )
+    check_deviations(*assumed)
     known = load_scenario(scenario)
-    if Path(path).suffix.lower() != ".csv":
-        seen, assumed = json_reading.read_json_observed(path, known, (deviation_mm, deviation_deg))
-    else:
-        seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
-    return ObservationFile(seen, known, assumed)
+    read = read_table if Path(path).suffix.lower() == ".csv" else read_json_observation
+    observation, is_assumed = read(path, known, assumed)
+    return ObservationFile(observation, known, is_assumed)
 
 
 def read_stated(path: str | Path, scenario: Scenario) -> Observation:
-    """An observation from a file that states every standard deviation itself.
+    """Read an observation from a file that states every standard deviation itself.
 
     Raises:
         InputError: Anything that is not as described, or a standard deviation is missing.
     """
-    if Path(path).suffix.lower() != ".csv":
-        return json_reading.read_json_observation(path, scenario)
     observation, _, assumed = read_observation_file(path, scenario)
     require(
         not assumed,
-        f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row.",
+        f"{path}: standard deviations are missing; state deviation_mm and deviation_deg of every operation.",
     )
     return observation
 
 
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
-    """The nominal goals of a scenario, as if they had been seen with these standard deviations."""
+    """Return the nominal poses of a scenario, as if they had been observed with these standard deviations."""
     check_deviations(deviation_mm, deviation_deg)
     layout = layout_at(scenario, 0.0, 0.0, 0.0)
     n = len(scenario.assembly)

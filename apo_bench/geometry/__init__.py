@@ -1,6 +1,6 @@
 """Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
 
-from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
+from apo_bench.geometry.arrays import Array, Ints, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces, receded_pieces
 from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
 from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
@@ -19,7 +19,7 @@ from apo_bench.geometry.penetration import (
     upright_bounds,
     ways_out,
 )
-from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straightened
+from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straighten
 from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, extent, world_bounds
@@ -32,7 +32,7 @@ from apo_bench.geometry.symmetry import (
     revolution,
     symmetries,
     turn_about,
-    turned_alike,
+    turn_alike,
 )
 from apo_bench.geometry.twist import ADJOINTS, GENERATORS, SERIES, exp_and_jacobian, right_jacobian
 
@@ -54,7 +54,6 @@ __all__ = (
     "Hull",
     "Ints",
     "Mate",
-    "NotReal",
     "Overlap",
     "PadPlace",
     "Piece",
@@ -113,10 +112,10 @@ __all__ = (
     "separating_axes",
     "shadow",
     "sides_of",
-    "straightened",
+    "straighten",
     "symmetries",
     "turn_about",
-    "turned_alike",
+    "turn_alike",
     "union_mesh",
     "upright_bounds",
     "ways_out",

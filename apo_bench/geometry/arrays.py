@@ -23,20 +23,16 @@ _MOST_ANSWERS = 16
 """Answers that are kept of one object; further ones are worked out each time."""
 
 
-class NotReal(ArgumentError):
-    """Complex numbers, whose imaginary parts numpy would drop."""
-
-
 def real(value: ArrayLike) -> Array:
     """A float64 copy of `value`.
 
     Raises:
-        NotReal: It holds complex numbers.
+        ArgumentError: It holds complex numbers, whose imaginary parts numpy would drop.
         TypeError, ValueError: It holds no numbers.
     """
     array = np.asarray(value)
     if array.dtype.kind == "c":
-        raise NotReal("real numbers are needed, complex ones were given")
+        raise ArgumentError("real numbers are needed, complex ones were given")
     return np.array(array, dtype=np.float64)
 
 
@@ -51,7 +47,7 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
     """
     try:
         array = real(value)
-    except NotReal:
+    except ArgumentError:
         raise
     except (TypeError, ValueError):
         raise ArgumentError(f"an array of numbers is needed, {kind(value)} was given") from None

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, freeze
-from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
+from apo_bench.geometry.polygon import polygons_of, rings_of, straighten
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
@@ -62,7 +62,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
         return NO_OVERLAP
-    flat = np.concatenate([straightened(ring) for piece in pieces for ring in rings_of(piece)])
+    flat = np.concatenate([straighten(ring) for piece in pieces for ring in rings_of(piece)])
     corners = pose.apply(T_on @ plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
 

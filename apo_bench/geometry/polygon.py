@@ -51,7 +51,7 @@ def rings_of(polygon: Any, turned: float | None = None) -> list[Array]:
     return [np.asarray(ring.coords)[:-1, :2] for ring in (shape.exterior, *shape.interiors)]
 
 
-def straightened(ring: Array) -> Array:
+def straighten(ring: Array) -> Array:
     """The corners of a closed ring (k, 2), each once, [m]: points in the middle of straight edges are dropped.
 
     A sliver, such as a disc seen nearly edge-on, keeps its points where no three corners would be left.

@@ -73,7 +73,7 @@ def turn_about(point: Array, axis: Array, angle_rad: float) -> Array:
     return np.asarray(pose.at(point) @ pose.exp(spin) @ pose.at(-point))
 
 
-def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
+def turn_alike(solid: Solid, T: Array, true: Array) -> Array:
     """The pose, (4, 4), at which a part of revolution looks as it does at T, turned the least from another pose.
 
     Of that one the rotation (3, 3) is enough. Any other part stays as it is.
@@ -154,7 +154,7 @@ def nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
     Any turn about an axis of revolution looks the same.
     """
     if revolution(solid) is not None:
-        return turned_alike(solid, T, expected)
+        return turn_alike(solid, T, expected)
     return np.asarray(T @ nearest_symmetry(symmetries(solid), (pose.inverse(expected) @ T)[None])[0])
 
 

@@ -1,7 +1,6 @@
 """Read and write files within limits, and start processes; knows nothing of assemblies."""
 
-from apo_bench.io.csv_reading import Columns, CsvRow, check_separator, read_csv
-from apo_bench.io.csv_writing import write_csv
+from apo_bench.io.csv_tables import Columns, CsvRow, check_separator, read_csv, write_csv
 from apo_bench.io.documents import (
     Finite,
     NotNegative,
@@ -12,41 +11,28 @@ from apo_bench.io.documents import (
     Triple,
     check_quaternion,
     convert_typed,
+    parse_plain,
     read_plain,
     read_typed,
 )
-from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
+from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.grouping import grouped
 from apo_bench.io.named_files import named_files
-from apo_bench.io.nodes import JsonNode, parse_json, read_json, read_toml
-from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
 from apo_bench.io.parquet import has_parquet, write_columns
 from apo_bench.io.processes import SAFE_PATH, environment
-from apo_bench.io.result_files import (
-    check_folders,
-    check_target,
-    is_there,
-    open_to_append,
-    put_back,
-    replace_file,
-    write_file,
-)
+from apo_bench.io.result_files import check_target, open_to_append, replace_file, write_file
+from apo_bench.io.safe_io import decoded, each_line, opened, read_bytes, read_text
 from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
 from apo_bench.io.streams import redirect_output
-from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
-from apo_bench.io.words import columns, direction, listed_words, with_article
+from apo_bench.io.text import columns, direction, listed_words, with_article
 
 __all__ = (
     "CONTROL",
-    "HALF_BUT_OF_FILES",
-    "HALF_LETTER",
     "SAFE_PATH",
     "UNSHOWN",
-    "WHOLE_LETTERS",
     "Columns",
     "CsvRow",
     "Finite",
-    "JsonNode",
     "NotNegative",
     "Positive",
     "Quadruple",
@@ -54,7 +40,6 @@ __all__ = (
     "Text",
     "Triple",
     "brief",
-    "check_folders",
     "check_quaternion",
     "check_separator",
     "check_target",
@@ -67,26 +52,18 @@ __all__ = (
     "each_line",
     "environment",
     "grouped",
-    "half_letter",
     "has_parquet",
-    "is_there",
-    "is_whole",
     "listed_words",
-    "load_matplotlib",
     "markdown",
     "named_files",
     "open_to_append",
     "opened",
-    "parse_json",
-    "put_back",
+    "parse_plain",
     "read_bytes",
     "read_csv",
-    "read_json",
     "read_plain",
     "read_text",
-    "read_toml",
     "read_typed",
-    "read_whole",
     "redirect_output",
     "replace_file",
     "save_figure",

@@ -2,10 +2,8 @@
 
 import json
 import re
-import tomllib
 from collections.abc import Iterator
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -14,9 +12,8 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import LARGEST_BYTES, read_text
+from apo_bench.io.safe_io import LARGEST_BYTES, read_text
 from apo_bench.io.safe_text import UNSHOWN
-from apo_bench.io.whole_json import unique_members
 
 Finite = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
 """Neither infinite nor NaN."""
@@ -83,22 +80,11 @@ def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
     Raises:
         InputError: It has another syntax.
     """
+    decode = msgspec.toml.decode if syntax == "toml" else msgspec.json.decode
     try:
-        if syntax == "toml":
-            return tomllib.loads(text)
-        return json.loads(text, parse_constant=partial(_refuse_constant, file), object_pairs_hook=unique_members(file))
-    except InputError:
-        raise
-    except json.JSONDecodeError as error:
-        raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: this is not TOML: {error}; mend the file at that place.") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: this is not {syntax.upper()}: nested too deep, or a huge number.") from error
-
-
-def _refuse_constant(file: str, constant: str) -> None:
-    raise InputError(f"{file}: every number must be finite, {constant} was given.")
+        return decode(text)
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise InputError(f"{file}: this is not {syntax.upper()} ({error}); correct the file at that place.") from error
 
 
 def convert_typed(value: Any, wanted: type[T], place: str) -> T:

@@ -1,15 +1,12 @@
 """Draw and save figures of matplotlib that no `matplotlibrc` in the current folder or at home changes."""
 
-import os
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from apo_bench.io.result_files import replace_file
-
-_READ = "matplotlibrc"
 
 
 @contextmanager
@@ -19,26 +16,12 @@ def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
     Text is drawn letter by letter: `$` in the name of a method begins no formula. A function that draws has this as a
     decorator or around its body, and imports what it needs of matplotlib inside.
     """
-    matplotlib = load_matplotlib()
+    matplotlib: Any = import_module("matplotlib")
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams["text.parse_math"] = False
         matplotlib.rcParams.update(settings or {})
         yield matplotlib
-
-
-def load_matplotlib() -> Any:
-    """Import matplotlib, from the root folder where the current one has a file of settings, which it would read."""
-    if "matplotlib" not in sys.modules and os.path.lexists(_READ):
-        here = Path.cwd()
-        os.chdir(here.anchor)
-        try:
-            import matplotlib
-        finally:
-            os.chdir(here)
-    import matplotlib
-
-    return matplotlib
 
 
 def save_figure(figure: Any, out: str | Path, *, dpi: int = 100) -> None:

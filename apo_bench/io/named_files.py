@@ -5,7 +5,7 @@ from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io.safe_io import read_bytes
 
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
 _MODELS = ("include", "model")

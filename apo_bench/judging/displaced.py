@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, Snapshot, corners, touched_contacts
-from apo_bench.geometry import Array, Solid, pose, turned_alike
+from apo_bench.geometry import Array, Solid, pose, turn_alike
 
 _ONE_WAY = 0.999
 """Cosine between the normals of faces that look the same way: together they are a plain support."""
@@ -37,14 +37,14 @@ def displacements(
         if put is not None and part not in away:
             solid = assembly.solids[part]
             at = _corners(solid)
-            T = turned_alike(solid, final.poses[part], put.poses[part])
+            T = turn_alike(solid, final.poses[part], put.poses[part])
             yield part, _farthest(pose.apply(T, at) - pose.apply(put.poses[part], at))
 
 
 def faults_of_place(
     assembly: Assembly, after: _After, final: Snapshot, away: Collection[str], seen: Poses
 ) -> Iterator[tuple[str, float]]:
-    """What moved and tells in the finished assembly: two parts in words, and how far a corner of either moved, [m].
+    """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
 
     Two movable parts that touch at the end: against each other, along what their contacts leave free, since the later
     of their last operations; but no farther than one of them moved in the room since its own. A part whose contacts
@@ -104,8 +104,8 @@ def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, 
 def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
     """The pose of b in the frame of a, as it looks, with parts of revolution turned about their axes the least."""
     for _ in range(_PASSES):
-        now = turned_alike(b, now, before)
-        now = pose.inverse(turned_alike(a, pose.inverse(now), pose.inverse(before)))
+        now = turn_alike(b, now, before)
+        now = pose.inverse(turn_alike(a, pose.inverse(now), pose.inverse(before)))
     return now
 
 

@@ -1,8 +1,8 @@
-"""Import MuJoCo without a graphics driver: one is loaded when the first picture is asked for.
+"""Import MuJoCo without a graphics driver, which the first picture loads.
 
 MuJoCo chooses its OpenGL backend by the variable MUJOCO_GL while it is imported, and a driver that is loaded then stays
-in the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. Where somebody
-has imported MuJoCo before, it is left as it is.
+in the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. If MuJoCo
+was imported before, it stays as it is.
 """
 
 import importlib
@@ -18,7 +18,7 @@ _NO_BACKEND = {_VARIABLE: "disable"}
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo; `mujoco.GLContext` is there when somebody uses it."""
+    """Import MuJoCo; `mujoco.GLContext` is there at its first use."""
     if "mujoco" in sys.modules:
         return
     with environment(_NO_BACKEND):
@@ -29,7 +29,7 @@ def import_mujoco() -> None:
 
 
 def _choose_later(module: ModuleType, source: ModuleType) -> None:
-    """Take the context out of a module; who first asks for it runs `source` again, under the variable as it is then."""
+    """Take the context out of a module; its first use runs `source` again, under the variable as it is then."""
     wanted = "GLContext"
     vars(module).pop(wanted, None)
 

@@ -1,9 +1,32 @@
-"""What a trial is asked for and what its row says: shared by all that makes rows and all that reads them.
+"""Settings and records of trials, shared by everything that makes or reads them."""
 
-Other rooms import from here; the folder of a sweep is in `run`.
-"""
-
+from apo_bench.records.contact_sources import (
+    DETECTED,
+    GIVEN,
+    SHIFT_MM,
+    WRONG,
+    WRONG_CONTACTS,
+    contact_source_name,
+)
+from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, FtNoise, checked_ft_sensor, ft_noise
+from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.records.methods import (
+    CORRECTOR,
+    CORRECTORS,
+    METHODS,
+    SIMULATED,
+    WITHOUT_CORRECTOR,
+    Method,
+    is_uncorrected,
+    knows_truth,
+    may_reobserve,
+    parse_method,
+    probes,
+    uses_contacts,
+    with_simulated,
+)
 from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
+from apo_bench.records.own_code import FAILURES, FOREIGN_ARMS, RESIDUALS
 from apo_bench.records.record import (
     KEY,
     LARGEST_NUMBER,
@@ -25,13 +48,9 @@ from apo_bench.records.record import (
 )
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
-    USUAL_FT_SENSOR,
-    FtNoise,
     assumed_error,
     checked_assumed_robot_error,
-    checked_ft_sensor,
     checked_robot_error,
-    ft_noise,
     robot_sigmas,
 )
 from apo_bench.records.secret_seed import (
@@ -47,6 +66,7 @@ from apo_bench.records.settings import (
     DEPTH_CAMERA,
     ENV_ID,
     NOISE_LEVEL,
+    NOISE_MODEL,
     RECORD_SCHEMA,
     SETTINGS,
     USUAL,
@@ -58,38 +78,7 @@ from apo_bench.records.settings import (
     noise_pair,
     refuse_noise,
 )
-from apo_bench.records.short_names import (
-    CORRECTOR,
-    CORRECTORS,
-    DETECTED,
-    FAILURES,
-    FOREIGN_ARMS,
-    GIVEN,
-    METHODS,
-    RESIDUALS,
-    SHIFT_MM,
-    SIMULATED,
-    WITHOUT_CORRECTOR,
-    WRONG,
-    WRONG_CONTACTS,
-    Method,
-    contact_source_name,
-    is_uncorrected,
-    knows_truth,
-    may_reobserve,
-    parse_method,
-    probes,
-    uses_contacts,
-    with_simulated,
-)
-from apo_bench.records.thresholds import (
-    MEANINGS,
-    USUAL_LIMITS,
-    Criteria,
-    Limits,
-    Meaning,
-    Thresholds,
-)
+from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
 from apo_bench.records.trial_numbers import EVALUATION_STARTS, FIRST_TRAINING_TRIAL
 
 __all__ = (
@@ -110,6 +99,7 @@ __all__ = (
     "MEANINGS",
     "METHODS",
     "NOISE_LEVEL",
+    "NOISE_MODEL",
     "NO_ROBOT_ERROR",
     "RECORD_FIELDS",
     "RECORD_SCHEMA",
@@ -161,7 +151,6 @@ __all__ = (
     "noise_pair",
     "parse_method",
     "probes",
-    "probing",
     "read_secret_seed",
     "record_key",
     "refuse_noise",

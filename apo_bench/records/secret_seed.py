@@ -6,6 +6,7 @@ import os
 import re
 import secrets
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import read_bytes, write_file
+from apo_bench.io import read_bytes
 
 FEWEST_BYTES = 16
 _MOST_BYTES = 512
@@ -82,7 +83,15 @@ def make_secret_seed(path: Path) -> None:
     Raises:
         InputError: The file cannot be made.
     """
-    write_file(path, f"{secrets.token_hex(32)}\n", private=True, over=False)
+    try:
+        with suppress(FileExistsError), open(path, "x", opener=_open_privately) as file:
+            file.write(f"{secrets.token_hex(32)}\n")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place.") from error
+
+
+def _open_privately(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
 
 
 def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:

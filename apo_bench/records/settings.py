@@ -13,17 +13,17 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError, require, require_text
+from apo_bench.records.contact_sources import checked_contact_source
+from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, checked_ft_sensor
+from apo_bench.records.methods import CORRECTOR, checked_method, probes
 from apo_bench.records.robot_error import (
     MATCHED,
     NO_ROBOT_ERROR,
-    USUAL_FT_SENSOR,
     checked_assumed_robot_error,
-    checked_ft_sensor,
     checked_robot_error,
 )
 from apo_bench.records.secret_seed import SecretSeed
 from apo_bench.records.setting_info import SettingInfo, about, check_value
-from apo_bench.records.short_names import CORRECTOR, checked_contact_source, checked_method, probes
 
 ENV_ID = "APOReplay-v0"
 RECORD_SCHEMA = "apo-bench/record/1"

@@ -1,7 +1,4 @@
-"""What the judge demands: one set of numbers, stated in the scenario and repeated in every row.
-
-Wall time that things may take [s], where nothing else is said.
-"""
+"""Thresholds of the judge, stated in the scenario and repeated in every record."""
 
 from dataclasses import dataclass
 from typing import Literal, final
@@ -49,15 +46,3 @@ class Criteria:
     clearance_mm: float
     """Per side, of the parts that were used."""
     success_means: Meaning = "assembled"
-
-
-@final
-@dataclass(frozen=True)
-class Limits:
-    """Of a sweep; said of a trial whose process died or was ended."""
-
-    trial_s: float | None = 600.0
-    """What one trial may take; None where trials had no process of their own."""
-
-
-USUAL_LIMITS = Limits()

@@ -45,7 +45,7 @@ def read_contacts(
         contact = Contact(
             _face(table.faces[0], f"{at}, first", solids, moves[0]), _face(table.faces[1], f"{at}, second", solids)
         )
-        _check(contact, at, moves, solids, there)
+        _check_contact(contact, at, moves, solids, there)
         require(contact not in contacts, f"{at}: '{contact}' stands here twice; keep one.")
         contacts[contact] = _gap(table, at, contact, solids)
     return contacts
@@ -73,8 +73,10 @@ def _face(name: str, place: str, solids: Mapping[str, Solid], main: str | None =
     return PartFace(part, face)
 
 
-def _check(contact: Contact, place: str, moves: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]) -> None:
-    """The first face is of a part that moves, the second of one that rests where it was put; they make a contact."""
+def _check_contact(
+    contact: Contact, place: str, moves: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
+) -> None:
+    """Check that the first face is of a part that moves, the second of one that rests, and that they make a contact."""
     above = contact.manipulated.part
     below = contact.environment.part
     require(above in moves, f"{place}, first: '{above}' does not move here; name a face of '{moves[0]}'.")

@@ -52,8 +52,8 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     if isinstance(given, Scenario):
         return given
     path = scenario_path(given)
-    if isinstance(given, str) and is_generated(given):
-        return _generated(path, whole_name(given))
+    if is_generated(given):
+        return _generated(path, whole_name(str(given)))
     return _kept(path, _stamps()) if path.stem == given else _read(path)
 
 
@@ -87,12 +87,8 @@ def _read(path: Path, checked: bool = True) -> Scenario:
 
 def scenario_path(given: str | Path) -> Path:
     """The file of a scenario, as `load_scenario` finds it; a generated one is written first."""
-    require(
-        isinstance(given, str | Path),
-        f"a scenario is a short name, a path or a Scenario, a {type(given).__name__} was given.",
-    )
-    if isinstance(given, str) and is_generated(given):
-        return generated_file(given)
+    if is_generated(given):
+        return generated_file(str(given))
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
     require_known("scenario", given, scenario_names(), rest=" Or give the path of a .toml file, or generated:SEED.")
@@ -132,12 +128,13 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         site=_site(top.site, f"{path}, site"),
         shifts=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Shift)),
         turns=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Turn)),
-        human_error=None if top.human_error is None else _careless(top.human_error, f"{path}, careless", entries),
+        human_error=None if top.human_error is None else _human_error(top.human_error, f"{path}, human_error", entries),
         thresholds=Thresholds(**judge),
         success_means=success_means,
         clearance_mm=top.clearance_mm,
         gap_mm=top.gap_mm,
         follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
+        source=path,
     )
     return scenario, tuple(entry.attach for entry in entries)
 
@@ -145,11 +142,11 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
 def _site(table: SiteTable, place: str) -> Site:
     x, y = table.center_mm
     wide, deep = table.spread_mm
-    low, high = check_span(table.yaw_deg, f"{place}, yaw_deg")
-    return Site((1e-3 * x, 1e-3 * y), (1e-3 * wide, 1e-3 * deep), (float(np.radians(low)), float(np.radians(high))))
+    low, high = np.radians(check_span(table.yaw_deg, f"{place}, yaw_deg"))
+    return Site((1e-3 * x, 1e-3 * y), (1e-3 * wide, 1e-3 * deep), (float(low), float(high)))
 
 
-def _careless(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
+def _human_error(table: HumanErrorTable, place: str, entries: tuple[OperationEntry, ...]) -> HumanError:
     known = 1 <= table.operation <= len(entries)
     require(known, f"{place}, operation: an operation from 1 to {len(entries)} is needed, {table.operation} was given.")
     axis = normalize_axis(table.along, f"{place}, along")

@@ -1,6 +1,7 @@
 """The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,16 +23,13 @@ def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: floa
             stands that much lower.
     """
     site = scenario.site
-    first_turn = 3 + len(scenario.shifts)
-    unit = rng.uniform(-1.0, 1.0, size=first_turn + len(scenario.turns))
+    spans = [site.yaw_rad, *((shift.low_m, shift.high_m) for shift in scenario.shifts)]
+    spans += [(turn.low_rad, turn.high_rad) for turn in scenario.turns]
+    unit = rng.uniform(-1.0, 1.0, size=2 + len(spans))
     x, y = np.asarray(site.center_m) + unit[:2] * site.spread_m
-    yaw = _between(*site.yaw_rad, unit[2])
-    shifts = [
-        _between(shift.low_m, shift.high_m, u) for shift, u in zip(scenario.shifts, unit[3:first_turn], strict=True)
-    ]
-    turns = [
-        _between(turn.low_rad, turn.high_rad, u) for turn, u in zip(scenario.turns, unit[first_turn:], strict=True)
-    ]
+    yaw, *varied = (0.5 * (a + b) + 0.5 * (b - a) * u for (a, b), u in zip(spans, unit[2:], strict=True))
+    shifts = varied[: len(scenario.shifts)]
+    turns = varied[len(scenario.shifts) :]
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     return layout_at(scenario, x, y, yaw, shifts, clearance, turns)
 
@@ -73,14 +71,55 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
     return lowered
 
 
-def _between(low: float, high: float, unit: float) -> float:
-    """The point of an interval that stands for `unit` in -1..1."""
-    return 0.5 * (low + high) + 0.5 * (high - low) * unit
-
-
 def nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad
     back = pose.inverse(pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2]))
     return {part: T if part in scenario.follows_site else back @ T for part, T in scenario.start.items()}
+
+
+class Layouts(NamedTuple):
+    """The truth of many trials."""
+
+    goals: Array
+    """(n, k, 4, 4): of k operations, world frame, [m]."""
+    start: Poses
+    """Part -> (n, 4, 4)."""
+
+
+def draw_layouts(scenario: Scenario, rng: np.random.Generator, n: int, clearance_mm: float | None = None) -> Layouts:
+    """Layouts, drawn as `draw_layout` draws them one after the other: equal up to rounding.
+
+    Args:
+        clearance_mm: As in `draw_layout`.
+    """
+    site = scenario.site
+    low, high = np.transpose(
+        [
+            *[(c - half, c + half) for c, half in zip(site.center_m, site.spread_m, strict=True)],
+            site.yaw_rad,
+            *[(shift.low_m, shift.high_m) for shift in scenario.shifts],
+            *[(turn.low_rad, turn.high_rad) for turn in scenario.turns],
+        ]
+    )
+    drawn = (low + high) / 2 + (high - low) / 2 * rng.uniform(-1.0, 1.0, (n, len(low)))
+    place = np.zeros((n, 6))
+    place[:, [0, 1, 5]] = drawn[:, :3]
+    T_world_assembly = pose.exp(place * [0, 0, 0, 1, 1, 1])
+    T_world_assembly[:, :3, 3] = place[:, :3]
+    fit = scenario.clearance_mm if clearance_mm is None else clearance_mm
+    nominal = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=fit)
+    goals = T_world_assembly[:, None] @ nominal.poses
+    lengths, angles = np.split(drawn[:, 3:], [len(scenario.shifts)], axis=1)
+    for shift, length in zip(scenario.shifts, lengths.T, strict=True):
+        goals[:, shift.operation] = goals[:, shift.operation] @ pose.exp(np.outer(length, [*shift.axis, 0.0, 0.0, 0.0]))
+    for turn, angle in zip(scenario.turns, angles.T, strict=True):
+        there = pose.at(turn.point)
+        by = there @ pose.exp(np.outer(angle, [0.0, 0.0, 0.0, *turn.axis])) @ pose.inverse(there)
+        goals[:, turn.operation] = goals[:, turn.operation] @ by
+    still = np.broadcast_to(np.eye(4), (n, 4, 4))
+    return Layouts(
+        goals,
+        {part: (T_world_assembly if part in scenario.follows_site else still) @ T for part, T in nominal.start.items()},
+    )

@@ -1,6 +1,6 @@
 """Whether shafts have play in their holes: by their sizes, or by the clearance."""
 
-from apo_bench.assembly import Assembly, Contact, contact_kind, geometric_play, play_mm
+from apo_bench.assembly import Assembly, contact_kind, geometric_play, play_mm
 from apo_bench.errors import require
 from apo_bench.scenario.scenario import Scenario
 
@@ -11,18 +11,12 @@ _NO_PLAY_MM = 1e-6
 def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
     """Why the first shaft that is as thick as its hole, or thicker, has no play there; None if all have some."""
     for contact in (contact for operation in assembly.operations for contact in operation.contacts):
-        if not _is_loose(assembly, contact, clearance_mm):
-            a, b = map(assembly.face_of, contact)
+        a, b = map(assembly.face_of, contact)
+        if contact_kind(a, b) == "shaft in hole" and (play_mm(a, b, clearance_mm) or 0.0) <= _NO_PLAY_MM:
             why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
             fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
             return f"'{contact}': the shaft has no play in the hole, {why}{fit}"
     return None
-
-
-def _is_loose(assembly: Assembly, contact: Contact, clearance_mm: float) -> bool:
-    a, b = map(assembly.face_of, contact)
-    play = play_mm(a, b, clearance_mm) if contact_kind(a, b) == "shaft in hole" else None
-    return play is None or play > _NO_PLAY_MM
 
 
 def check_clearance(scenario: Scenario, clearance_mm: float) -> None:

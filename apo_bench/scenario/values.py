@@ -7,8 +7,7 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, Table, Triple, check_quaternion, convert_typed
-from apo_bench.io.nodes import JsonNode
+from apo_bench.io import Quadruple, Table, Triple, check_quaternion
 
 LARGEST_LENGTH_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
@@ -82,8 +81,3 @@ def check_span(span: tuple[float, float], place: str) -> tuple[float, float]:
     """
     require(span[0] <= span[1], f"{place}: a lowest and a highest number are needed, in this order.")
     return span
-
-
-def read_pose(node: JsonNode) -> Array:
-    """A pose out of a document, (4, 4), [m]."""
-    return convert_typed(node.value, Pose, node.place).matrix

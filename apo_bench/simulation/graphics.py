@@ -3,7 +3,6 @@
 import importlib
 import os
 import sys
-import warnings
 from typing import Any
 
 from apo_bench.errors import InputError, require
@@ -13,8 +12,9 @@ _VARIABLE = "MUJOCO_GL"
 _CHILDREN = {SAFE_PATH: "1"}
 """While GLFW is imported, which starts a Python process."""
 _SHADOW_TEXELS = 4096
+"""Texels of the shadow map along a side: 0.4 mm on the table each."""
 _SHADOW_REACH = 0.5
-"""Texels of the shadow map along a side, and its half width over the size of the scene: 0.4 mm on the table each."""
+"""Half width of the shadow map over the size of the scene."""
 
 
 @environment(_CHILDREN)
@@ -33,11 +33,11 @@ def renderer(model: Any, width: int, height: int) -> Any:
         import mujoco
         from mujoco.rendering.classic import gl_context
 
-        if _VARIABLE not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        if _VARIABLE not in os.environ and _has_no_display():
             os.environ[_VARIABLE] = "egl"
-            importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
-        if gl_context.GLContext.__module__ == "mujoco.glfw" and (why := _no_window()):
-            raise RuntimeError(why)  # drawing without a display, MuJoCo ends the process at the second try
+            importlib.reload(gl_context)  # MuJoCo chose when it was imported
+        if gl_context.GLContext.__module__ == "mujoco.glfw" and _has_no_display():
+            raise RuntimeError("there is no display")  # drawing without one, MuJoCo ends the process at the second try
         model.vis.quality.shadowsize = _SHADOW_TEXELS
         model.vis.map.shadowclip = _SHADOW_REACH
         return mujoco.Renderer(model, height, width)
@@ -55,48 +55,22 @@ def renderer(model: Any, width: int, height: int) -> Any:
 
 @environment(_CHILDREN)
 def need_window() -> None:
-    """Refuse what MuJoCo's viewer would end the process for.
+    """Refuse a window for which MuJoCo's viewer would end the process.
 
     Raises:
-        InputError: There is no display, or none that can draw.
+        InputError: There is no display.
     """
-    if sys.platform == "darwin":
-        return
-    if why := _no_window():
-        raise InputError(
-            f"no window can be opened here ({why}); run it where there is a display, or use render_mode='rgb_array' or "
-            "a film."
-        )
+    require(
+        not _has_no_display(),
+        "no window can be opened here (there is no display); run it where there is one, or use "
+        "render_mode='rgb_array' or a film.",
+    )
+    importlib.import_module("mujoco.viewer")
 
 
-def _no_window() -> str:
-    """Why GLFW cannot open a window, empty where it can."""
-    try:
-        import glfw
-    except ImportError as error:
-        return _reason(error)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", glfw.GLFWError)
-        try:
-            window = _hidden_window(glfw)
-        except glfw.GLFWError as error:
-            return _reason(error)
-    if window:
-        glfw.destroy_window(window)
-        return ""
-    message: Any = glfw.get_error()[1]
-    return message.decode(errors="replace") if message else "there is no display"
-
-
-def _hidden_window(glfw: Any) -> Any:
-    if not glfw.init():
-        return None
-    glfw.default_window_hints()
-    glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
-    try:
-        return glfw.create_window(64, 64, "", None, None)
-    finally:
-        glfw.default_window_hints()
+def _has_no_display() -> bool:
+    """Whether no window can be opened: a Linux machine whose variables name no display."""
+    return sys.platform.startswith("linux") and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
 def _reason(error: Exception) -> str:

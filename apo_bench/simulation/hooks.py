@@ -1,4 +1,4 @@
-"""One list of hooks: what is called while hands demonstrate or a robot replays. Whoever is called changes nothing."""
+"""Hooks: functions that a demonstration or a replay calls; they change nothing."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 BY_HAND = "by hand"
 TOUCHING = "touch"
-"""What is done by hands, and by a robot that feels before it takes anything: nothing is in its hand."""
+"""Phases with an empty hand: a demonstration, and a robot that probes before it picks anything."""
 
 
-class Doing(NamedTuple):
-    """What is done at one moment."""
+class Phase(NamedTuple):
+    """What hands or robot do at one moment."""
 
     operation: int | None
     """From 0; None before the first begins."""
@@ -28,7 +28,7 @@ class Doing(NamedTuple):
 
 
 def _nothing(_: Any) -> None:
-    """What is called where nobody wants to know."""
+    """The hook by default."""
 
 
 @final
@@ -42,14 +42,14 @@ class Hooks:
     """Before an operation is done or undone."""
     after_step: Callable[[Step], None] = _nothing
     """After it, when everything rests; not of one that fails."""
-    after_tick: Callable[[Any, Doing], None] | None = None
+    after_tick: Callable[[Any, Phase], None] | None = None
     """With the `MjData`, every tick of simulated time; of a demonstration also at its start. None: states between steps
     are not worked out for it."""
     tick_s: float = TICK_S
     """How long a tick of a demonstration is; a robot's is `TICK_S`."""
 
 
-def hooks_of(watch: Hooks | Callable[[Any], None] | None) -> Hooks:
+def as_hooks(watch: Hooks | Callable[[Any], None] | None) -> Hooks:
     """What is passed as `watch` as hooks: a function of the `MjData` is called after every tick.
 
     Args:
@@ -60,4 +60,4 @@ def hooks_of(watch: Hooks | Callable[[Any], None] | None) -> Hooks:
     if watch is None:
         return Hooks()
     look = watch
-    return Hooks(after_tick=lambda data, doing: look(data), tick_s=getattr(watch, "period_s", TICK_S))
+    return Hooks(after_tick=lambda data, phase: look(data), tick_s=getattr(watch, "period_s", TICK_S))

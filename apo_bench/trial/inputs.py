@@ -4,27 +4,27 @@ Python modules of the user count with the modules that they import from the same
 them. Data that such a module reads for itself does not count.
 """
 
-import ast
 import hashlib
 import json
-import sys
 import sysconfig
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, fields, is_dataclass
 from functools import cache
-from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
+from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from apo_bench.io import opened
-from apo_bench.names import admit
+from apo_bench.names import find_own_module
 from apo_bench.perception.observation.noise_file import noise_path
-from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
+from apo_bench.records.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
-from apo_bench.scenario.parts import part_files_of
+from apo_bench.scenario.parts import read_part
 
 _CHUNK = 1 << 20
 
@@ -43,7 +43,7 @@ def content_pieces(
     """
     thresholds = json.dumps(asdict(scenario.thresholds), sort_keys=True).encode()
     files = {
-        **{f"part {part}": part_files_of(path) for part, path in sorted(scenario.part_files.items())},
+        **{f"part {part}": read_part(path).files for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml",),
         "arm": arm_files if isinstance(arm_files, tuple) else (arm_files,),
         "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
@@ -63,15 +63,15 @@ def noise_content(*names: str) -> dict[str, str]:
 
 def own_content(kind: str, *names: str) -> dict[str, str]:
     """Of what is given as `module:name`: `KIND NAME` -> 16 hexadecimal digits over the files of the module."""
-    own = [name for name in names if is_own_code(name, DATA_PREFIXES[kind])]
+    own = [name for name in names if is_own_code(kind, name)]
     digests = {f"{kind} {name}": _module_digest(name.partition(":")[0]) for name in own}
     return {name: found for name, found in digests.items() if found is not None}
 
 
 def own_files(name: str) -> tuple[Path, ...]:
     """The files of what is given as `module:name`; none of any other name."""
-    data = tuple(prefix for prefixes in DATA_PREFIXES.values() for prefix in prefixes)
-    return module_files(name.partition(":")[0]) if is_own_code(name, data) else ()
+    is_own = all(is_own_code(column, name) for column in DATA_PREFIXES)
+    return module_files(name.partition(":")[0]) if is_own else ()
 
 
 def digest_files(paths: Iterable[Path]) -> str:
@@ -97,78 +97,29 @@ def digest(content: bytes) -> str:
 
 @cache
 def _module_digest(module: str) -> str | None:
-    """Over the source files of a module as they were when it was first asked for; None if it has none."""
+    """Over the source files of a module at the first call; None if it has none."""
     files = module_files(module)
     return digest_files(files) if files else None
 
 
 def module_files(module: str) -> tuple[Path, ...]:
-    """The source files of a module and of what it imports from where it is; nothing is imported.
+    """The source files of a module and of what it imports from the same folder; nothing is imported.
 
-    Of a module that is installed among other packages, only its own package is looked through.
+    Of a module that is installed among other packages, only its own package counts.
     """
-    spec = _located(module)
-    origin = Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
-    if spec is None or origin is None or not origin.is_file():
+    top = module.partition(".")[0]
+    spec = find_spec(top) or find_own_module(top)
+    if spec is None or not spec.has_location or spec.origin is None:
         return ()
-    home = origin.parents[module.count(".") + (spec.submodule_search_locations is not None)]
-    top = module.partition(".")[0] if home in _site_folders() else ""
-    files = {origin: None}
-    todo = [origin, *_files_of(home, tuple(module.split(".")))]
-    while todo:
-        file = todo.pop()
-        files[file] = None
-        for name in _imports(file, home):
-            if name[0] == top or not top:
-                todo += [each for each in _files_of(home, name) if each not in files]
-    return tuple(sorted(files))
-
-
-def _site_folders() -> set[Path]:
-    return {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}
-
-
-def _files_of(home: Path, name: tuple[str, ...]) -> Iterator[Path]:
-    """The files that importing a module runs, of those below a folder."""
-    if name[0] == "apo_bench":
-        return
-    for end in range(1, len(name) + 1):
-        place = home.joinpath(*name[:end])
-        yield from (each for each in (place.with_suffix(".py"), place / "__init__.py") if each.is_file())
-
-
-def _imports(file: Path, home: Path) -> Iterator[tuple[str, ...]]:
-    """The names of all modules that a source file imports anywhere in it, and of what may be one."""
-    try:
-        nodes = list(ast.walk(ast.parse(file.read_bytes())))
-    except (SyntaxError, ValueError):
-        return
-    package = file.relative_to(home).parent.parts
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            yield from (tuple(alias.name.split(".")) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else ()
-            base = (*base, *(node.module.split(".") if node.module else ()))
-            yield from ((*base, alias.name) for alias in node.names)
-
-
-def _located(module: str) -> ModuleSpec | None:
-    """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
-    admit(module)
-    spec = None
-    path = None
-    for end in range(1, module.count(".") + 2):
-        name = ".".join(module.split(".")[:end])
-        try:
-            specs = (finder.find_spec(name, path) for finder in sys.meta_path)
-            spec = next((each for each in specs if each is not None), None)
-            path = None if spec is None else spec.submodule_search_locations
-        except (ImportError, ValueError, KeyError, AttributeError):
-            return None
-        if spec is None or (path is None and name != module):
-            return None
-    return spec
+    home = Path(spec.origin).parents[spec.submodule_search_locations is not None]
+    others = ["apo_bench"]
+    if home in {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}:
+        others = [path.stem for path in home.iterdir() if path.stem != top]
+    finder = ModuleFinder([str(home)], excludes=others)
+    with suppress(ImportError, SyntaxError):
+        finder.import_hook(module)
+    found = (getattr(module, "__file__", None) for module in finder.modules.values())
+    return tuple(sorted(Path(file) for file in found if file and file.endswith(".py")))
 
 
 def _scenario_digest(scenario: Scenario, source: str | Path | Scenario) -> str:

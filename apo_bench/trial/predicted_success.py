@@ -23,7 +23,7 @@ from scipy.special import ndtr, ndtri
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.verdict import least_overlaps
+from apo_bench.judging.finished import least_overlaps
 from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario
@@ -115,11 +115,11 @@ def predicted_success_sentence(predicted_success: float) -> str:
     return f"success with probability {predicted_success:.2f}"
 
 
-def abstained(predicted_success: float, least: float) -> Outcome:
-    """The ending of a trial whose plan promises less than was asked for."""
-    # as many digits as tell the two apart: 0.947, where 0.95 is asked
-    said = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
-    why = f": {said}, where {least:.15g} is asked"
+def abstain(predicted_success: float, least: float) -> Outcome:
+    """The ending of a trial whose plan has a lower predicted success than the least that is required."""
+    # as many digits as tell the two apart: 0.947, where 0.95 is required
+    shown = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
+    why = f": {shown}, where {least:.15g} is required"
     return Outcome("promise", "abstained", None, sentence("abstained") + why)
 
 

@@ -1,4 +1,4 @@
-"""How often plans with a score succeeded: of generated assemblies, by `python -m benchmarks.promise`.
+"""Success rates of plans by score, of generated assemblies; `python -m benchmarks.predicted_success` writes them.
 
 Between two scores the rate is interpolated.
 """

@@ -1,7 +1,4 @@
-"""One trial as it is asked for: its settings, what is seen of it, its row, a film, a file.
-
-The file is long, as all options of `replay` meet here.
-"""
+"""Run a trial as a command requests it: options, an observation file, a film."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,6 +7,9 @@ from typing import Any, final
 
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
+from apo_bench.formats.json_forms import write_form
+from apo_bench.formats.observation import read_observation_file, read_stated
+from apo_bench.formats.observation_json import observation_form
 from apo_bench.io import read_text
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -26,9 +26,10 @@ from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
+from apo_bench.trial.endings import record_lost_trial
 from apo_bench.trial.fingerprint import config_hash, content_hash
-from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.rollout import Rollout, trial_story
+from apo_bench.trial.run import MEASURED, noise_of, record_trial, run_measured
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
@@ -36,44 +37,43 @@ from apo_bench.trial.stages import (
     observe_demonstration,
     scene_of,
 )
-from apo_bench.trial.trial import MEASURED, noise_of, run_measured, trial_row
 
 Show = Callable[[Rollout], None]
 _DRAWN = (
     *(NOISE_LEVEL.name, "noise_mm", "noise_deg", "human_error_scale", "noise", "contact_source"),
     *("pose_source", "max_reobservations", "robot_error", "seed", "secret_seed_file"),
 )
-"""What has no meaning for an observation that comes from a file, though its contacts may be recognised."""
+"""Options without a meaning for an observation from a file, except `contact_source` with given or detected contacts."""
 _MEASURED_AIR_M = 5e-3
-"""A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
+"""How far a measured start may be off: as far apart as `loose_success` lets faces be."""
 
 
 @final
 @dataclass(frozen=True)
 class Request:
-    """One replay."""
+    """One trial of a command."""
 
     scenario: str
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Option as an argument (`noise_level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
-    """
+    """Option as an argument (`noise_level`, `secret_seed_file`, ...) -> value; None stands for the default."""
     observation: Path | None = None
+    """File to read the observation from instead of drawing it."""
     save_observation: Path | None = None
     video: Path | None = None
 
 
 def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
-    """The settings that a request means.
+    """The settings of a request.
 
     Args:
-        clearance_mm: Of the scenario, where the request does not say.
+        clearance_mm: Of the scenario, if the request does not state it.
 
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
     """
     options = {name: value for name, value in request.options.items() if value is not None}
-    if request.observation:
-        _refuse_contradictions(request, options)
+    if request.observation is not None:
+        _refuse_drawing(request, options)
     for name in ("noise", "noise_deg"):
         require(
             options.get("pose_source") != DEPTH_CAMERA or name not in options,
@@ -88,61 +88,14 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
     return TrialConfig(**(usual | in_python(options)))
 
 
-def looked_at(
-    scenario: str,
-    observation: Path | None,
-    options: Mapping[str, Any],
-    deviation_mm: float | None,
-    deviation_deg: float | None,
-) -> tuple[Observation, bool]:
-    """What is seen of a trial, or stands in a file, and whether standard deviations had to be assumed.
-
-    Args:
-        options: What only a trial knows: level, seed, noise and so on, as in `Request`.
-        deviation_mm, deviation_deg: What only a file may need.
-
-    Raises:
-        InputError: One of the two was given with the other, or something is not allowed.
-    """
-    of_file = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
-    refused, reason = (of_file, "is for files") if observation is None else (options, "draws a trial")
-    for name, value in refused.items():
-        if value is not None:
-            where = "without" if observation is None else "together with"
-            raise InputError(
-                f"{_option(name)}, which {reason}, was given {where} --observation; leave one of them out."
-            )
-    if observation is None:
-        return _watched(Request(scenario, options)), False
-    from apo_bench.formats.observation import read_observation_file
-
-    seen, _, assumed = read_observation_file(
-        observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
-    )
-    return seen, assumed
-
-
-def _watched(request: Request) -> Observation:
-    """What is seen of the trial that was asked for; nothing is replayed."""
-    scenario = load_scenario(request.scenario)
-    spec = requested_settings(request, scenario.clearance_mm)
-    scene = scene_of(spec, scenario)
-    simulated = demonstration_of(spec, scene)
-    if simulated.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
-    return look(spec, scene, simulated)
-
-
-def look(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
-    """The demonstration of a trial through its eye."""
-    return observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.secret_seed)
-
-
-def _refuse_contradictions(request: Request, options: Mapping[str, Any]) -> None:
-    may_be = options.get("contact_source") in ("given", *DETECTED)
-    drawn = [name for name in _DRAWN if name in options and not (name == "contact_source" and may_be)]
-    saved = ["save_observation"] if request.save_observation is not None else []
-    for name in (*drawn, *saved):
+def _refuse_drawing(request: Request, options: Mapping[str, Any]) -> None:
+    """Raise an `InputError` if an observation file comes with an option that draws something."""
+    drawn = [name for name in _DRAWN if name in options]
+    if options.get("contact_source") in ("given", *DETECTED):
+        drawn.remove("contact_source")
+    if request.save_observation is not None:
+        drawn.append("save_observation")
+    for name in drawn:
         raise InputError(
             f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
         )
@@ -152,54 +105,49 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def run_request(request: Request, show: Show | None = None) -> TrialRecord:
-    """Run the trial, or the replay of a measured observation, that was asked for.
+def load_or_draw_observation(
+    scenario: str,
+    path: Path | None,
+    options: Mapping[str, Any],
+    deviation_mm: float | None,
+    deviation_deg: float | None,
+) -> tuple[Observation, bool]:
+    """The observation of a file or else of a trial, and whether standard deviations had to be assumed.
 
     Args:
-        show: Called with what is to be seen of the trial, if anything was replayed.
+        path: The file; None draws a trial and replays nothing.
+        options: What only a trial has: noise level, seed, noise and so on, as in `Request`.
+        deviation_mm, deviation_deg: What only a file may need.
 
     Raises:
-        InputError: A setting that is not allowed, or two that contradict each other.
+        InputError: One of the two was given with the other, or something is not allowed.
+        RuntimeError: The human's own assembly is not right in this trial.
     """
-    _, spec = checked_request(request)
-    return run_settings(request, spec, show)
+    of_file = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    refused, reason = (of_file, "is for files") if path is None else (options, "draws a trial")
+    for name, value in refused.items():
+        where = "without" if path is None else "together with"
+        require(
+            value is None,
+            f"{_option(name)}, which {reason}, was given {where} --observation; leave one of them out.",
+        )
+    if path is not None:
+        observation, _, assumed = read_observation_file(
+            path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
+        )
+        return observation, assumed
+    loaded = load_scenario(scenario)
+    config = requested_settings(Request(scenario, options), loaded.clearance_mm)
+    scene = scene_of(config, loaded)
+    simulated = demonstration_of(config, scene)
+    if simulated.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
+    return _observe(config, scene, simulated), False
 
 
-def run_settings(request: Request, spec: TrialConfig, show: Show | None = None) -> TrialRecord:
-    """Run the trial of these settings; the request says what to read and to write.
-
-    Args:
-        show: As in `run_request`.
-    """
-    scene = scene_of(spec)
-    simulated = None
-    track = FilmTrack() if request.video or show else None
-    watch = None if track is None else track.hooks
-    if request.video:
-        renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
-    seen: Observation | None = None
-    if request.observation:
-        from apo_bench.formats.observation import read_stated
-
-        path = request.observation
-        seen = read_stated(path, scene.scenario)
-        aloft = in_the_air(seen.assembly, seen.start, _MEASURED_AIR_M)
-        if aloft is not None:
-            raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-        row = run_measured(spec, scene, seen, read_text(path, "observation file"), watch=watch)
-    else:
-        simulated = demonstration_of(spec, scene)
-        row = _drawn(request, spec, scene, simulated, watch)
-        if track is not None and row["sim_time_s"] is not None:
-            seen = look(spec, scene, simulated)
-    if track is None or seen is None or row["sim_time_s"] is None:
-        return row
-    rollout = trial_story(spec, scene, seen, track, row, simulated)
-    if request.video:
-        write_film(scene.scenario.assembly, rollout.assembled, rollout.chapters, request.video)
-    if show is not None:
-        show(rollout)
-    return row
+def _observe(config: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
+    noise = noise_of(config, scene, simulated)
+    return observe_demonstration(simulated, noise, config.seed, config.secret_seed)
 
 
 def checked_request(request: Request) -> tuple[Scenario, TrialConfig]:
@@ -209,33 +157,69 @@ def checked_request(request: Request) -> tuple[Scenario, TrialConfig]:
         InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
     """
     scenario = load_scenario(request.scenario)
-    settings = requested_settings(request, scenario.clearance_mm)
+    config = requested_settings(request, scenario.clearance_mm)
     if request.video is not None:
         check_film(request.video)
-    return scenario, settings
+    return scenario, config
 
 
-def lost_request(request: Request, spec: TrialConfig, scenario: Scenario, code: str) -> TrialRecord:
-    """The row of a trial whose process died or took too long.
+def run_request(request: Request, show: Show | None = None) -> TrialRecord:
+    """Run the trial, or replay the observation file, of a request.
 
     Args:
-        code: `worker_died` or `time_limit`.
+        show: Called with the rollout of the trial, if it was replayed.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
     """
-    content = content_hash(scenario, spec.scenario, find_arm(spec.arm).files)
-    row = lost(spec, content, code)
+    _, config = checked_request(request)
+    return run_settings(request, config, show)
+
+
+def run_settings(request: Request, config: TrialConfig, show: Show | None = None) -> TrialRecord:
+    """Run the trial of these settings; the request names the files to read and to write.
+
+    Args:
+        show: As in `run_request`.
+    """
+    scene = scene_of(config)
+    track = FilmTrack() if request.video or show else None
+    watch = None if track is None else track.hooks
+    if request.video:
+        renderer(scene.work.model, 16, 12).close()  # fails before the trial if nothing can draw
+    simulated = None
+    if request.observation is not None:
+        observation = read_stated(request.observation, scene.scenario)
+        aloft = in_the_air(observation.assembly, observation.start, _MEASURED_AIR_M)
+        if aloft is not None:
+            raise InputError(f"{request.observation}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
+        text = read_text(request.observation, "observation file")
+        record = run_measured(config, scene, observation, text, watch=watch)
+    else:
+        simulated = demonstration_of(config, scene)
+        if request.save_observation is not None:
+            name = request.scenario
+            name = name if name == scene.scenario.name else str(Path(name).resolve())
+            write_form(observation_form(_observe(config, scene, simulated), name), request.save_observation)
+        content = content_hash(scene.scenario, config.scenario, scene.arm.files)
+        record = record_trial(config, scene, simulated, content, watch=watch)
+    if track is None or record["sim_time_s"] is None:
+        return record
+    if simulated is not None:
+        observation = _observe(config, scene, simulated)
+    rollout = trial_story(config, scene, observation, track, record, simulated)
+    if request.video:
+        write_film(scene.scenario.assembly, rollout.assembled, rollout.segments, request.video)
+    if show is not None:
+        show(rollout)
+    return record
+
+
+def record_lost_request(request: Request, config: TrialConfig, scenario: Scenario, code: str) -> TrialRecord:
+    """The record of a request whose process died (`worker_died`) or took too long (`time_limit`)."""
+    content = content_hash(scenario, config.scenario, find_arm(config.arm).files)
+    record = record_lost_trial(config, content, code)
     if request.observation is None:
-        return row
+        return record
     text = read_text(request.observation, "observation file")
-    return row | {"config_hash": config_hash(spec, content, text), **MEASURED}
-
-
-def _drawn(
-    request: Request, spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, watch: Any
-) -> TrialRecord:
-    if request.save_observation:
-        from apo_bench.formats.json_forms import observation_form, write_form
-
-        name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
-        write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)
-    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    return trial_row(spec, scene, simulated, content, watch=watch)
+    return record | {"config_hash": config_hash(config, content, text), **MEASURED}

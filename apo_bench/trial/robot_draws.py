@@ -14,7 +14,8 @@ from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.resting import resting_poses
 from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
-from apo_bench.simulation.execution.probing.feeling import ACTS, TOUCH_SIGMA_M
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
+from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 
@@ -65,15 +66,15 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
         slip_deg: Standard deviation of how a part turns in the hand.
     """
     left = np.array(error.in_hand)
-    for move in moves(plan, scene, True, ACTS):
+    for move in moves(plan, scene, True, PROBING_ACTIONS):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
-        if t.flush is not None:
-            felt = np.array([place.point for place in t.beside]) if t.beside else t.flush.feet
+        if t.flat is not None:
+            felt = np.array([place.point for place in t.side_touches]) if t.side_touches else t.flat.feet
             lever = float(np.linalg.norm(felt - felt.mean(axis=0), axis=1).max())
             told = TOUCH_SIGMA_M / lever
             slip[2:4] *= 0.0, told / np.hypot(told, np.radians(slip_deg))
-        if t.beside or t.front is not None:
+        if t.side_touches or t.front is not None:
             slip[1] = 0.0
         left[move.step.operation] = pose.exp(slip)
     none = np.eye(4)

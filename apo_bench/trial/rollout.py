@@ -10,7 +10,7 @@ from apo_bench.assembly import Observation, Poses, placements
 from apo_bench.geometry import Array
 from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.film.track import Chapter, FilmTrack, scenario_chapter
+from apo_bench.simulation.film.track import FilmTrack, Segment, scenario_segment
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
@@ -25,7 +25,7 @@ class Rollout:
     """One trial, or what a scenario asks for."""
 
     scene: Scene
-    chapters: tuple[Chapter, ...]
+    segments: tuple[Segment, ...]
     assembled: Poses
     """Where the parts should be when all is done."""
     goals: Mapping[str, Array] = field(default_factory=dict)
@@ -35,8 +35,8 @@ class Rollout:
 def scenario_story(scene: Scene) -> Rollout:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
-    chapter = scenario_chapter(scene, layout.start, layout.poses)
-    return Rollout(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
+    segment = scenario_segment(scene, layout.start, layout.poses)
+    return Rollout(scene, (segment,), placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
 
 
 def trial_story(
@@ -60,12 +60,12 @@ def trial_story(
     goals = {AS_SEEN: seen.poses, AS_CORRECTED: plan.target_poses}
     if method == "uncorrected" or np.array_equal(seen.poses, plan.target_poses):
         del goals[AS_CORRECTED]
-    chapters = []
+    segments = []
     if simulated is not None:
         goals[AS_TRUE] = simulated.layout.poses
         start = simulated.layout.start
-        chapters.append(_demonstration(spec, scene, simulated))
-    reached = Chapter(
+        segments.append(_demonstration(spec, scene, simulated))
+    reached = Segment(
         title=f"{scene.scenario.name}: replay, method {method}",
         world=scene.work,
         start=start,
@@ -74,7 +74,7 @@ def trial_story(
         good=row["success"],
     )
     true = goals.get(AS_TRUE, plan.target_poses)
-    return Rollout(scene, (*chapters, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
+    return Rollout(scene, (*segments, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
 
 
 def ending(row: TrialRecord) -> str:
@@ -86,11 +86,11 @@ def ending(row: TrialRecord) -> str:
     return f"failure{where} ({row['failure_code']}): {row['sentence']}"
 
 
-def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Chapter:
+def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Segment:
     track = FilmTrack()
     watch_again(scene, simulated, spec.human_error_scale, spec.seed, spec.secret_seed, track.hooks)
     how = f"seen with errors of {spec.noise_mm:g} mm and {spec.noise_deg:g} deg"
-    return Chapter(
+    return Segment(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
         world=scene.shown,
         start=simulated.layout.start,

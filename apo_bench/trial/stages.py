@@ -5,7 +5,6 @@ Chance enters a trial here and nowhere else.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
@@ -15,9 +14,9 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import Noise
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.planning.prediction.failure import ARM_CODES, predict
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -31,8 +30,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
-from apo_bench.simulation.execution import ReplayCache, replay
-from apo_bench.simulation.execution.probing.feeling import ProbingConfig
+from apo_bench.simulation.execution import DEFAULT_EXECUTION, ExecutionConfig, ReplayCache, replay
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene, build_scene
@@ -145,14 +143,16 @@ def reobservations_of(
     allowed: int,
     secret_seed: SecretSeed | None = None,
     assembly: Assembly | None = None,
-) -> Looks:
+) -> Reobservations:
     """Looks at the demonstration of a trial that was observed once.
 
     Args:
-        assembly: As in `Looks`.
+        assembly: As in `Reobservations`.
     """
     first = stream(seed, OBSERVATION, secret_seed)
-    return Looks(simulated.demonstration, noise, stream(seed, REOBSERVE, secret_seed), allowed, assembly, first)
+    return Reobservations(
+        simulated.demonstration, noise, stream(seed, REOBSERVE, secret_seed), allowed, assembly, first
+    )
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:
@@ -231,12 +231,8 @@ def replay_and_judge(
     scene: Scene,
     reference: Array,
     watch: Any = None,
-    fidelity: str = "full",
+    config: ExecutionConfig = DEFAULT_EXECUTION,
     cache: ReplayCache | None = None,
-    spiral: bool = False,
-    most_s: float = math.inf,
-    error: RobotError | None = None,
-    probing: ProbingConfig | None = None,
 ) -> Attempt:
     """Replay a plan and judge what was reached.
 
@@ -244,22 +240,10 @@ def replay_and_judge(
         reference: (n, 4, 4) goals that are right, world frame, [m]; the judge takes from them how
             faces should overlap, how far apart they may be, and which of the symmetries of a part is meant.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
-        searches: The robot feels for a hole where a motion into it is stopped by force.
-        most_s: Simulated time that the replay may take.
-        error: What is wrong with the robot; the judge does not care whose error it was.
-        feels: How the robot finds out by touching what is wrong with it; None: it does not.
+        config: How the robot executes the plan.
+        cache: As in `replay`.
     """
-    result = replay(
-        plan,
-        scene,
-        watch,
-        fidelity=fidelity,
-        cache=cache,
-        spiral=spiral,
-        most_s=most_s,
-        error=error,
-        probing=probing,
-    )
+    result = replay(plan, scene, watch, config, cache=cache)
     return Attempt(result, judge(scene.scenario.assembly, result.reached, reference, scene.criteria))
 
 

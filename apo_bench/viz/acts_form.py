@@ -14,9 +14,9 @@ from apo_bench.formats.json_forms import TO_MM_DEG
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.records import FtNoise, ft_noise
-from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search
-from apo_bench.simulation.execution.probing import touching
-from apo_bench.simulation.execution.probing.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
+from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search, search_laws
+from apo_bench.simulation.execution.probing import lay_flat, touching
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import (
     OPENING_M,
     TouchPlace,
@@ -24,7 +24,8 @@ from apo_bench.simulation.execution.probing.places import (
     opposite_places,
     wall_places,
 )
-from apo_bench.simulation.robot import felt_noise, low_pass_part
+from apo_bench.simulation.execution.probing.state import FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
+from apo_bench.simulation.robot import filtered_noise, low_pass_part
 from apo_bench.simulation.scene import Scene
 from apo_bench.viz.robot_form import pose_form, tip_form
 
@@ -39,7 +40,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
         InputError: An unknown sensor.
     """
     noise = ft_noise(sensor)
-    felt = felt_noise(noise, low_pass_part())
+    felt = filtered_noise(noise, low_pass_part())
     guard = touch_guard(felt.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
     return {
@@ -54,28 +55,28 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             **{name: [_touch(place, frames) for place in places(plan, scene)] for name, places in touches.items()},
         },
         "lay_flat": {
-            "press_n": touching.PRESS_N,
-            "from_above_mm": _mm(touching.NEAR_M),
-            "yield_mm_s_per_n": _mm(touching.YIELD_M),
-            "fastest_mm_s": _mm(touching.FASTEST),
-            "fastest_deg_s": _deg(touching.FASTEST_RAD),
+            "press_n": lay_flat.PRESS_N,
+            "from_above_mm": _mm(lay_flat.NEAR_M),
+            "yield_mm_s_per_n": _mm(lay_flat.YIELD_M),
+            "fastest_mm_s": _mm(lay_flat.FASTEST),
+            "fastest_deg_s": _deg(lay_flat.FASTEST_RAD),
             "lies_when": {
-                "press_within_n": round(touching.CALM * touching.PRESS_N, 6),
-                "turns_slower_than_deg_s": _deg(touching.CALM_RAD),
-                "for_s": touching.CALM_S,
+                "press_within_n": round(lay_flat.CALM * lay_flat.PRESS_N, 6),
+                "turns_slower_than_deg_s": _deg(lay_flat.CALM_RAD),
+                "for_s": lay_flat.CALM_S,
             },
-            "gives_up": {"after_s": touching.MOST_S, "below_begin_mm": _mm(touching.DEEPEST_M)},
+            "gives_up": {"after_s": lay_flat.MOST_S, "below_begin_mm": _mm(lay_flat.DEEPEST_M)},
             "sigma_mm": _mm(FOOT_SIGMA_M),
         },
         "search": {
             "radius_mm": _mm(search.RADIUS_M),
-            "pitch_mm": _mm(search.PITCH_M),
+            "pitch_mm": _mm(search_laws.PITCH_M),
             "then_turned_deg": list(search.YAWS_DEG),
             "radius_turned_mm": _mm(search.YAWED_RADIUS_M),
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, ACTS)],
+        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, PROBING_ACTIONS)],
     }
 
 
@@ -98,7 +99,7 @@ def _step(move: Move, scene: Scene, frames: RobotFrames, felt: FtNoise) -> dict[
         "part": t.part,
         "square": [_grip(grip, t.T_world_start, scene, frames) for grip in t.squaring],
         "grasp_twice": _grip(first, t.T_world_start, scene, frames),
-        "lay_flat": None if t.flush is None else _laid(t, frames, felt),
+        "lay_flat": None if t.flat is None else _laid(t, frames, felt),
         "guards_n": {"down": round(t.place_n, 6), "insert": round(t.insert_n, 6), "slide": round(t.slide_n, 6)},
         "search_press_n": None if t.front is None else round(t.slide_n, 6),
     }
@@ -115,18 +116,18 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
 
 def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | None:
     """None where the sensor could not tell lying."""
-    averaged = touching.averaged_s(t.flush, felt)
-    if averaged > touching.LONGEST_S:
+    averaged = lay_flat.averaged_s(t.flat, felt)
+    if averaged > lay_flat.LONGEST_S:
         return None
     grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
-    foot = pose.apply(t.flush.T, t.flush.feet[:1])[0]
+    foot = pose.apply(t.flat.T, t.flat.feet[:1])[0]
     return {
         "when": "before the last motion" if t.into.level else "before it is carried",
-        "at": tip_form(t.flush.T @ grip.T_part_tip, frames),
+        "at": tip_form(t.flat.T @ grip.T_part_tip, frames),
         "part_in_tip": pose_form(pose.inverse(grip.T_part_tip), frames),
-        "feet_in_part_mm": [_mms(foot) for foot in t.flush.feet],
-        **_plane(t.flush.normal, float(t.flush.normal @ foot), frames),
-        "yield_deg_s_per_nm": _deg(touching.turn_yield(t.flush)),
+        "feet_in_part_mm": [_mms(foot) for foot in t.flat.feet],
+        **_plane(t.flat.normal, float(t.flat.normal @ foot), frames),
+        "yield_deg_s_per_nm": _deg(lay_flat.turn_yield(t.flat)),
         "averaged_over_s": round(averaged, 6),
         "then_walls": [
             {
@@ -135,7 +136,7 @@ def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | N
                 "point_in_part_mm": _mms(place.point),
                 **_plane(place.normal, float(place.normal @ place.edge), frames),
             }
-            for place in t.beside
+            for place in t.side_touches
         ],
     }
 

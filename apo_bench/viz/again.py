@@ -14,7 +14,7 @@ def why_not_again(row: TrialRecord, spec: TrialConfig) -> str:
     if config_hash(spec, content) == row.get("config_hash"):
         return ""
     secret = row.get("secret_seed") is not None and spec.secret_seed is None
-    return "its salt was not given (--secret-seed-file)" if secret else "other code or assets made it"
+    return "its salt was not given (--secret-seed-file)" if secret else "another version or other files made it"
 
 
 def run_again(spec: TrialConfig) -> tuple[TrialRecord, Rollout | None]:

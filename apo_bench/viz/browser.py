@@ -25,7 +25,7 @@ _FOV_RAD = np.radians(45.0)  # as in films
 _BUTTONS = (
     {"play / stop": "play", "moment back": "previous", "moment on": "next"},
     {"operation back": "previous operation", "operation on": "next operation"},
-    {"demonstration": "previous chapter", "replay": "next chapter"},
+    {"demonstration": "previous segment", "replay": "next segment"},
     {"names of faces": "faces", "goals": "goals"},
 )
 """Label -> what `Cursor.press` is told."""
@@ -69,7 +69,7 @@ class Page:
     def __init__(self, rollout: Rollout, port: int) -> None:
         self.cursor = Cursor(rollout)
         self._asked = deque[str | int]()
-        self._data = initial_state(rollout.scene.work, rollout.chapters[0].start)
+        self._data = initial_state(rollout.scene.work, rollout.segments[0].start)
         self._server = _server(port)
         self._drawn: object = None
         self._shown: dict[tuple[ShapeKind, int], Any] = {}
@@ -104,7 +104,7 @@ class Page:
             for (kind, number), handle in self._shown.items():
                 if handle.visible != (number < count[kind]):
                     handle.visible = number < count[kind]
-            self._words.content = "\n\n".join((f"**{snapshot.chapter.title}**", *snapshot.words))
+            self._words.content = "\n\n".join((f"**{snapshot.segment.title}**", *snapshot.words))
             self._slider.value = state[0]
         self._drawn = state
 

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly import Arc, Graph, Layout, joint_play_mm, placements, relation_graph, touched_contacts
 from apo_bench.geometry import Array
 from apo_bench.io import listed_words
-from apo_bench.judging.verdict import fixtures
+from apo_bench.judging.finished import fixtures
 from apo_bench.planning.insertion.states import classify
 from apo_bench.scenario import NOTHING_M, HumanError, Scenario, Turn, spread_error
 

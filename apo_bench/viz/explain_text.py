@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Hypothesis, spelled
+from apo_bench.assembly import Hypothesis, spell
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
-from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
+from apo_bench.correction.relation_equations import RelationHold
+from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.formats.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array
 from apo_bench.io import grouped, listed_words, with_article
@@ -155,7 +156,7 @@ def _part_form(part: PartExplanation) -> dict[str, Any]:
     return {
         "part": part.part,
         "placed": part.placed + 1,
-        "odl": spelled(part.odl),
+        "odl": spell(part.odl),
         **pose_form(part.pose),
         "rank": part.rank,
         "fixed": list(part.fixed),
@@ -187,7 +188,7 @@ def _hold_form(hold: RelationHold) -> dict[str, Any]:
         "parts": list(hold.parts),
         "made": hold.made + 1,
         "lost": None if hold.lost is None else hold.lost + 1,
-        "equation": spelled(hold.word),
+        "equation": spell(hold.word),
         "operations": _numbers(sorted({term.operation for term in hold.word})),
     }
 

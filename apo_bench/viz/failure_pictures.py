@@ -18,8 +18,9 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.io import each_line
 from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, record_key, settings_of
-from apo_bench.records.run.replay_command import Files, left_out, own_code
-from apo_bench.records.run.validation import row_of
+from apo_bench.records.own_code import describe_own_code, own_code
+from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.validation import record_of
 
 _SIZE = (640, 480)
 _QUALITY = 82
@@ -51,7 +52,7 @@ def failure_pictures(
     missed: list[str] = []
     for row in chosen:
         if not trust_code and own_code(row):
-            missed.append(left_out([row]))
+            missed.append(describe_own_code([row]))
             continue
         try:
             pictures.append(_picture_of(row, folder, files or {}, secret_seed))
@@ -96,7 +97,7 @@ def _whole_row(folder: Path, row: TrialRecord) -> Mapping[str, Any]:
     path = folder / "trials.jsonl"
     for number, line in each_line(path, "table of trials"):
         if all(part in line for part in wanted):
-            whole = row_of(line, f"{path}, line {number}")
+            whole = record_of(line, f"{path}, line {number}")
             if record_key(whole) == record_key(row):
                 return whole
     return {}
@@ -111,7 +112,7 @@ def _draw_again(row: TrialRecord, spec: TrialConfig) -> Any:
     if rollout is None or any(now.get(name) != row.get(name) for name in _SAME):
         return None
     poses = _poses(now["reached"])
-    last = rollout.chapters[-1].moments[-1].qpos
+    last = rollout.segments[-1].moments[-1].qpos
     camera = _camera(rollout.scene, row, poses)
     return picture_with_arm(rollout.scene, poses, last, *_SIZE, camera, _mark(row, rollout.scene, poses))
 

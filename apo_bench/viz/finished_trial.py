@@ -6,9 +6,9 @@ from pathlib import Path
 from apo_bench.errors import InputError
 from apo_bench.io import each_line
 from apo_bench.records import TrialRecord, read_secret_seed, settings_of
-from apo_bench.records.run.replay_command import own_code
+from apo_bench.records.own_code import own_code
 from apo_bench.records.run.run_file import read_run, scenario_files
-from apo_bench.records.run.validation import row_of
+from apo_bench.records.run.validation import record_of
 from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.again import run_again, why_not_again
 
@@ -28,7 +28,7 @@ def trial_again(folder: Path, number: int | None, secret_seed_file: Path | None 
     if named := own_code(row):
         raise RuntimeError(
             f"trial {number} names code that does not come with the package ({', '.join(named)}), which no file makes "
-            "run; give it to `apo-bench replay .. --view` yourself."
+            "run; give it to `apo-bench run .. --view` yourself."
         )
     name = row["scenario"]
     spec = settings_of(row, scenario_files(read_run(folder)).get(name, name))
@@ -48,7 +48,7 @@ def _chosen(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
     k = 0
     for k, line in each_line(path, "table of trials"):
         if number in (None, k):
-            row = row_of(line, f"{path}, line {k}")
+            row = record_of(line, f"{path}, line {k}")
             if number is not None or (row["success"] is False and row["sim_time_s"] is not None):
                 return k, row
             first = first or (k, row)

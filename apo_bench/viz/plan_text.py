@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Plan, placements, spelled
+from apo_bench.assembly import Plan, placements, spell
 from apo_bench.formats.json_forms import pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.io import columns, direction
@@ -60,7 +60,7 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     lines = []
     for (k, undo), T in zip(plan.schedule, plan.step_poses, strict=True):
         what = everything[k]
-        before = spelled(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
+        before = spell(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
         leaves, comes = (what.after, what.before) if undo else (what.before, what.after)
         lines.append(
             PlanLine(

@@ -1,10 +1,10 @@
-"""What `apo-bench recognise` found, as a table, in sentences and as JSON."""
+"""What `apo-bench detect-contacts` found, as a table, in sentences and as JSON."""
 
 from math import degrees
 from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.perception.detection.evidence import Recognised
+from apo_bench.perception.detection.evidence import DetectedContacts
 from apo_bench.trial.detected_contacts import count_contacts
 from apo_bench.viz.tables import form_table
 
@@ -60,7 +60,7 @@ def _changes(best: Assembly, other: Assembly) -> tuple[list[str], list[str]]:
 
 
 def recognition_form(
-    name: str, kind: str, observation: Observation, recognised: Recognised, assumed: bool
+    name: str, kind: str, observation: Observation, recognised: DetectedContacts, assumed: bool
 ) -> dict[str, Any]:
     """Everything, in mm and degrees; operations from 1."""
     in_scenario = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
@@ -99,7 +99,7 @@ def _contact_form(operation: int, contact: Contact) -> dict[str, Any]:
     }
 
 
-def _missed(right: Assembly, recognised: Recognised) -> list[tuple[int, Contact]]:
+def _missed(right: Assembly, recognised: DetectedContacts) -> list[tuple[int, Contact]]:
     named = {(e.made, e.contact) for e in recognised.evidence}
     return [(r.made, r.contact) for r in right.relations() if (r.made, r.contact) not in named]
 

@@ -88,7 +88,7 @@ def checked_view(view: int) -> int:
 
 
 def sensor_form(run: SensorRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
-    """Everything that `apo-bench eye` says, operations from 1; the error is that of the sensor, not the human's."""
+    """Everything that `apo-bench inspect depth` says, operations from 1; the error is that of the sensor, not the human's."""
     by_operation = {event.operation: event for event in run.events if event.operation is not None}
     return {
         "schema": _FORM,

@@ -10,7 +10,7 @@ from apo_bench.assembly import Assembly, PartFace, placements
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.overlay import Color, Overlay, Snapshot
-from apo_bench.simulation.film.track import Chapter, FilmMoment, part_poses
+from apo_bench.simulation.film.track import FilmMoment, Segment, part_poses
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout
 
 Faces = Literal["none", "this operation", "all"]
@@ -26,21 +26,21 @@ _COLORS: dict[str, tuple[str, Color]] = {
 @final
 @dataclass(eq=False)
 class Cursor:
-    """One moment of a story, whose chapters follow each other; methods move it, `snapshot` says what is there."""
+    """One moment of a story, whose segments follow each other; methods move it, `snapshot` says what is there."""
 
     rollout: Rollout
     place: int = 0
-    """The number of the moment, from 0, through all chapters."""
+    """The number of the moment, from 0, through all segments."""
     playing: bool = False
     faces: Faces = "this operation"
     shows_goals: bool = False
     _played_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.places = [(chapter, moment) for chapter in self.rollout.chapters for moment in chapter.moments]
+        self.places = [(segment, moment) for segment in self.rollout.segments for moment in segment.moments]
 
     @property
-    def chapter(self) -> Chapter:
+    def segment(self) -> Segment:
         return self.places[self.place][0]
 
     @property
@@ -53,11 +53,11 @@ class Cursor:
 
     @property
     def _is_last(self) -> bool:
-        return self.moment is self.chapter.moments[-1]
+        return self.moment is self.segment.moments[-1]
 
     def snapshot(self) -> Snapshot:
         """What is to be seen here."""
-        return Snapshot(self.chapter, self.moment, self.words(), self._faces(), self._overlays())
+        return Snapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
 
     def press(self, key: str) -> None:
         """Do what a key means, one of `WINDOW_KEYS`."""
@@ -65,15 +65,15 @@ class Cursor:
         if key == "play":
             self.playing = not self.playing
             if self.playing and self._is_last:
-                self.go(self.place - len(self.chapter.moments) + 1)
+                self.go(self.place - len(self.segment.moments) + 1)
         elif key == "faces":
             self.faces = FACES[(FACES.index(self.faces) + 1) % len(FACES)]
         elif key == "goals":
             self.shows_goals = not self.shows_goals
         elif what == "operation":
-            self._jump([(id(chapter), moment.doing.operation) for chapter, moment in self.places], way)
-        elif what == "chapter":
-            self._jump([id(chapter) for chapter, _ in self.places], way)
+            self._jump([(id(segment), moment.phase.operation) for segment, moment in self.places], way)
+        elif what == "segment":
+            self._jump([id(segment) for segment, _ in self.places], way)
         else:
             self.go(self.place + (1 if way == "next" else -1))
 
@@ -83,7 +83,7 @@ class Cursor:
         self._played_s = self.moment.time_s
 
     def pass_time(self, seconds: float) -> None:
-        """Go on in real time, if that is asked for; it stops at the end of the chapter."""
+        """Go on in real time, if that is asked for; it stops at the end of the segment."""
         self._played_s += seconds
         while self.playing and not self._is_last and self.places[self.place + 1][1].time_s <= self._played_s:
             self.place += 1
@@ -92,11 +92,11 @@ class Cursor:
     def words(self) -> tuple[str, ...]:
         """What is done here, the force, how far goals and the part are from the true goal; at the end, how it ended."""
         moment = self.moment
-        ending = self.chapter.ending
-        k = moment.doing.operation
+        ending = self.segment.ending
+        k = moment.phase.operation
         words = [f"{moment.time_s:.2f} s, {operation_words(self._assembly, moment)}"]
-        if ending and self.chapter.world is self.rollout.scene.work:
-            words.append(f"force {moment.doing.force_n:.1f} N")
+        if ending and self.segment.world is self.rollout.scene.work:
+            words.append(f"force {moment.phase.force_n:.1f} N")
         if k is not None:
             words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
         if self.shows_goals:
@@ -111,7 +111,7 @@ class Cursor:
             return []
         true = self.rollout.goals[AS_TRUE][k]
         placed = {name: goals[k] for name, goals in self.rollout.goals.items() if name != AS_TRUE}
-        placed["as it is now"] = part_poses(self.chapter, self.moment)[self._assembly.operations[k].main]
+        placed["as it is now"] = part_poses(self.segment, self.moment)[self._assembly.operations[k].main]
         lines = []
         for name, T in placed.items():
             twist = pose.log(pose.inverse(true) @ T)
@@ -128,7 +128,7 @@ class Cursor:
             self.go(max((i for i in begins if i < self.place), default=0))
 
     def _faces(self) -> tuple[PartFace, ...]:
-        k = self.moment.doing.operation
+        k = self.moment.phase.operation
         if self.faces == "all":
             solids = self._assembly.solids.items()
             return tuple(PartFace(part, face) for part, solid in solids for face in (*solid.faces, *solid.rounds))
@@ -137,13 +137,13 @@ class Cursor:
 
     def _overlays(self) -> tuple[Overlay, ...]:
         """What was moved up to here, where goals put it."""
-        k = self.moment.doing.operation
+        k = self.moment.phase.operation
         if k is None or not self.shows_goals:
             return ()
         begun = self._assembly.first(k + 1)
         moved = {part for operation in begun.operations for part in operation.moves}
         overlays = []
         for name, goals in self.rollout.goals.items():
-            poses = placements(begun, self.chapter.start, goals[: k + 1])[-1]
+            poses = placements(begun, self.segment.start, goals[: k + 1])[-1]
             overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)

@@ -28,8 +28,8 @@ def choose_display(port: int | None) -> Display:
     require(not missing or port is None, f"--port {port} was given, which is for a browser, but {missing}.")
     if missing:
         raise InputError(
-            f"{no_window()}, and for a browser {missing}. `apo-bench replay .. --video FILE.mp4` "
-            "and `apo-bench show` need neither."
+            f"{no_window()}, and for a browser {missing}. `apo-bench run .. --video FILE.mp4` "
+            "and `apo-bench inspect poses` need neither."
         )
     return "browser"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.assembly import Graph, arc_residuals, largest_gap, relation_graph, spelled
+from apo_bench.assembly import Graph, arc_residuals, largest_gap, relation_graph, spell
 from apo_bench.geometry import pose
 from tests import scenes
 
@@ -37,7 +37,7 @@ FIG_6_ARCS = {
 
 def odl(graph: Graph, arc: int) -> tuple[str, str]:
     ends = graph.arcs[arc].manipulated, graph.arcs[arc].environment
-    a, b = ("T0" if node.placed is None else spelled(node.odl) for node in ends)
+    a, b = ("T0" if node.placed is None else spell(node.odl) for node in ends)
     return a, b
 
 

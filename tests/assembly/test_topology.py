@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly
-from apo_bench.assembly import Operation, inverted, placements, product, simplified, spelled
+from apo_bench.assembly import Operation, invert, placements, product, simplify, spell
 from apo_bench.assembly.topology import Term
 from apo_bench.geometry import pose
 from tests import scenes
@@ -16,7 +16,7 @@ from tests import scenes
 
 def words(assembly: Assembly, after: int) -> dict[str, str]:
     """Part -> its ODL as a string, after that operation, counted from 1."""
-    return {part: spelled(odl) for part, odl in assembly.odls()[after - 1].items()}
+    return {part: spell(odl) for part, odl in assembly.odls()[after - 1].items()}
 
 
 def moves(*operations: Operation) -> Assembly:
@@ -75,19 +75,19 @@ TERMS = st.lists(st.builds(Term, st.integers(0, 3), st.booleans()), max_size=8)
 @settings(max_examples=40, deadline=None)
 def test_products(odl: list[Term], seed: int) -> None:
     goals = pose.exp(np.random.default_rng(seed).standard_normal((4, 6)))
-    assert_allclose(product(simplified(odl), goals), product(odl, goals), atol=1e-9)
-    assert_allclose(product(inverted(odl), goals) @ product(odl, goals), np.eye(4), atol=1e-9)
+    assert_allclose(product(simplify(odl), goals), product(odl, goals), atol=1e-9)
+    assert_allclose(product(invert(odl), goals) @ product(odl, goals), np.eye(4), atol=1e-9)
 
 
 @given(TERMS)
 def test_nothing_is_left_of_a_word_and_its_inverse(odl: list[Term]) -> None:
-    assert simplified((*inverted(odl), *odl)) == ()
-    assert inverted(inverted(odl)) == tuple(odl)
+    assert simplify((*invert(odl), *odl)) == ()
+    assert invert(invert(odl)) == tuple(odl)
 
 
 def test_spelled_counts_from_one() -> None:
-    assert spelled((Term(5), Term(4, True), Term(1))) == "T6 T5^-1 T2"
-    assert spelled(()) == "I"
+    assert spell((Term(5), Term(4, True), Term(1))) == "T6 T5^-1 T2"
+    assert spell(()) == "I"
 
 
 def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:

@@ -1,4 +1,4 @@
-"""The committed headline holds what it says; that it can be had again, see `tests/trial/test_success_rate.py`."""
+"""The committed headline holds what it says; `tests/trial/test_success_rate.py` repeats a part of it."""
 
 from __future__ import annotations
 
@@ -16,26 +16,19 @@ from apo_bench import SweepConfig
 from apo_bench.benchmark.analysis import Cell, tally
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.records import RECORD_SCHEMA
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
-from benchmarks.headline_figure import NAME_HEIGHT, apart
-from benchmarks.headline_look import block, look_at, robot_rate, sentence
-from benchmarks.headline_page import GRID, METHODS, OLDER, up_to_date
-from benchmarks.headline_tables import rates
+from benchmarks.headline_figure import NAME_HEIGHT, spread
+from benchmarks.headline_page import GRID, METHODS, OLDER, is_up_to_date, rates
+from benchmarks.headline_summary import block, robot_rate, sentence, summarise
 
 SEEDS = 40
-MOST_TRIALS = 16_000
-"""A run of the headline shall take less than an hour on two cores."""
+MOST_TRIALS = 16_000  # an hour on two cores
 
 
 @cache
 def kept_rows() -> list[dict[str, Any]]:
-    rows = headline.kept_rows()
-    return [
-        row if row["schema"] == RECORD_SCHEMA else {"as_demonstrated": row["success"], "secret_seed": None} | row
-        for row in rows
-    ]
+    return headline.kept_rows()
 
 
 @cache
@@ -49,7 +42,7 @@ def fidelity() -> str:
 
 
 def key(row: dict[str, Any]) -> tuple[Any, ...]:
-    where = (row["noise"], row.get("robot_error") or "none")
+    where = (row["noise"], row["robot_error"])
     return row["scenario"], row["seed"], row["method"], row["noise_mm"], row["human_error_scale"], *where
 
 
@@ -68,10 +61,10 @@ def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
 
 
 def test_the_page_says_so_where_the_sweep_file_asks_for_other_trials() -> None:
-    assert (OLDER.strip() in PAGE.read_text(encoding="utf-8")) != up_to_date(run_file())
+    assert (OLDER.strip() in PAGE.read_text(encoding="utf-8")) != is_up_to_date(run_file())
 
 
-def test_the_sweep_of_the_headline_is_small_and_meets_what_breaks_it() -> None:
+def test_the_sweep_of_the_headline_is_small_and_has_the_limits() -> None:
     grids = read_sweep(GRID, {"trials": 1})
     trials = [trial for unit in units(grids, load_all(grids)) for trial in unit]
     assert SEEDS * len(trials) <= MOST_TRIALS
@@ -88,78 +81,78 @@ def test_the_sweep_of_the_headline_is_small_and_meets_what_breaks_it() -> None:
 def test_the_table_is_that_of_the_rows() -> None:
     lines = (KEPT / "table.csv").read_text().splitlines()
     names = lines[0].split(",")
-    told = [dict(zip(names, line.split(","), strict=False)) for line in lines[1:]]
-    counted = {
-        (t["scenario"], t["noise"], t["method"], float(t["noise_mm"]), float(t["human_error_scale"]), error_of(t)): t
-        for t in told
+    counts = {
+        (
+            t["scenario"],
+            t["noise"],
+            t["method"],
+            float(t["noise_mm"]),
+            float(t["human_error_scale"]),
+            t["robot_error"],
+        ): t
+        for t in (dict(zip(names, line.split(","), strict=False)) for line in lines[1:])
     }
-    assert len(counted) == len(lines) - 1
+    assert len(counts) == len(lines) - 1
     for cell in tally(kept_rows()):
-        line = counted[
-            cell.scenario, cell.noise, cell.method, cell.noise_level, cell.human_error_scale, cell.robot_error
-        ]
+        line = counts[cell.scenario, cell.noise, cell.method, cell.noise_mm, cell.human_error_scale, cell.robot_error]
         assert (int(line["trials"]), int(line["successes"])) == (cell.trials, cell.successes)
 
 
-def error_of(line: dict[str, str]) -> str:
-    return line.get("robot_error") or "none"
-
-
 @pytest.mark.parametrize("page", [*BLOCKS, PAGE], ids=lambda path: path.name)
-def test_the_first_look_is_the_same_on_every_page_and_that_of_the_rows(page: Path) -> None:
+def test_the_summary_is_the_same_on_every_page_and_that_of_the_rows(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    look = look_at(tally(kept_rows()))
+    summary = summarise(tally(kept_rows()))
     if page in BLOCKS:
         written = text.split(BEGIN)[1].split(END)[0].strip()
-        assert written == "\n".join(block(look, *BLOCKS[page]))
-    assert text.count(sentence(look)) == 1
+        assert written == "\n".join(block(summary, *BLOCKS[page]))
+    assert text.count(sentence(summary)) == 1
     picture = re.search(r"!\[[^\]]*\]\(([^)]*headline\.png)\)", text)
     assert picture is not None
     assert (page.parent / picture.group(1)).exists()
 
 
 def cell(method: str, successes: int, **more: Any) -> Cell:
-    """Ten trials at level 1, a careful human."""
+    """Ten trials at 1 mm, no human error."""
     first = next(c for c in tally(kept_rows()) if c.scenario == "stick_in_tower")
-    plain = replace(first, human_error_scale=0.0, noise_level=1.0, noise_deg=1.0, trials=10, excluded=0)
+    plain = replace(first, human_error_scale=0.0, noise_mm=1.0, noise_deg=1.0, trials=10, excluded=0)
     return replace(plain, **{"method": method, "successes": successes, "demonstrated": successes, **more})
 
 
-CELLS = [
-    cell("uncorrected", 1),
-    cell("spiral-search", 2),
-    cell("contact", 9),
-    cell("contact-robust", 10),
-    cell("contact-robust", 0, human_error_scale=1.0),
-    cell("contact-robust", 6, noise="megapose-tless"),
-    cell("contact-robust", 3, robot_error="hand_eye:0.5/0.1"),
-    cell("contact-robust+spiral", 7, robot_error="hand_eye:0.5/0.1"),
-    cell("oracle", 4, noise_level=0.0, robot_error="hand_eye:0.5/0.1"),
-]
-
-
-def test_the_sentence_says_what_was_counted_and_nothing_that_was_not_run() -> None:
-    assert re.findall(r"\*\*(\d+ %)\*\*", sentence(look_at(CELLS))) == ["10 %", "20 %", "100 %", "60 %", "30 %", "70 %"]
-    assert re.findall(r"\*\*(\d+ %)\*\*", sentence(look_at(CELLS[:3]))) == ["10 %", "20 %", "90 %"]
-    assert "breaks" not in sentence(look_at(CELLS[:4]))
-
-
-def test_the_oracle_under_an_error_of_the_robot_is_found_at_level_zero() -> None:
-    rate = robot_rate(look_at(CELLS), "oracle", "hand_eye:0.5/0.1")
-    assert rate == (4, 10)
+def test_the_sentence_says_what_was_counted_and_nothing_that_did_not_run() -> None:
+    cells = [
+        cell("uncorrected", 1),
+        cell("spiral-search", 2),
+        cell("contact", 9),
+        cell("contact-robust", 10),
+        cell("contact-robust", 0, human_error_scale=1.0),
+        cell("contact-robust", 6, noise="megapose-tless"),
+        cell("contact-robust", 3, robot_error="hand_eye:0.5/0.1"),
+        cell("contact-robust+spiral", 7, robot_error="hand_eye:0.5/0.1"),
+        cell("oracle", 4, noise_mm=0.0, robot_error="hand_eye:0.5/0.1"),
+    ]
+    numbers = re.compile(r"\*\*(\d+ %)\*\*")
+    assert numbers.findall(sentence(summarise(cells))) == ["10 %", "20 %", "100 %", "60 %", "30 %", "70 %"]
+    assert numbers.findall(sentence(summarise(cells[:3]))) == ["10 %", "20 %", "90 %"]
+    assert "limits" not in sentence(summarise(cells[:4]))
+    assert robot_rate(summarise(cells), "oracle", "hand_eye:0.5/0.1") == (4, 10)
 
 
 def test_every_rate_stands_in_its_line_and_column() -> None:
     shown = [
         cell("uncorrected", 1),
-        cell("uncorrected", 3, noise_level=2.0),
-        cell("spiral-search", 5, noise_level=2.0, demonstrated=4),
+        cell("uncorrected", 3, noise_mm=2.0),
+        cell("spiral-search", 5, noise_mm=2.0, demonstrated=4),
     ]
-    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.noise_level)
-    assert lines == ["| method | 1 | 2 |", "|---|--:|--:|", "| none | 10 | 30 |", "| search |  | 50 (40) |"]
+    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.noise_mm)
+    assert lines == [
+        "| method | 1 | 2 |",
+        "|---|---|---|",
+        "| uncorrected | 10 | 30 |",
+        "| spiral-search |  | 50 (40) |",
+    ]
 
 
 def test_names_beside_lines_do_not_touch_and_keep_their_order() -> None:
-    heights = apart([0.0, 97.0, 98.0, 100.0])
+    heights = spread([0.0, 97.0, 98.0, 100.0])
     assert (heights[0], heights[-1]) == (0.0, 100.0)
     assert all(high - low >= NAME_HEIGHT for low, high in pairwise(heights))

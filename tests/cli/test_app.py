@@ -13,11 +13,11 @@ import pytest
 from apo_bench import load_scenario
 from apo_bench.cli import app as cli
 from apo_bench.records import RECORD_SCHEMA
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.scenario.file import scenario_names
 
-TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "uncorrected")
-MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "uncorrected")
+TRIAL = ("run", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "uncorrected")
+MEASURED = ("run", "stick_in_tower", "--grasp", "weld", "--method", "uncorrected")
 HOPELESS = ("--noise-level", "40")
 """Plans at this level are refused before the arm moves, so that a replay costs little."""
 QUICK = ("--fidelity", "near-contact")
@@ -43,16 +43,16 @@ def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], t
     from apo_bench.viz.card import scenario_card
 
     loaded = load_scenario("vanished_fixture")
-    assert run(capsys, "scenarios", "vanished_fixture") == (0, scenario_card(loaded), "")
-    assert run(capsys, "scenario", "card", "vanished_fixture") == (0, scenario_card(loaded), "")
+    assert run(capsys, "scenario", "show", "vanished_fixture") == (0, scenario_card(loaded), "")
+    assert run(capsys, "scenario", "show", "vanished_fixture") == (0, scenario_card(loaded), "")
     path = tmp_path / "mine.toml"
     path.write_text((folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    _, out, _ = run(capsys, "scenarios", str(path))
+    _, out, _ = run(capsys, "scenario", "show", str(path))
     assert out == scenario_card(loaded).replace("vanished_fixture:", "mine:")
 
 
 def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "graph", "pocket_table")
+    code, out, err = run(capsys, "inspect", "graph", "pocket_table")
     assert (code, err) == (0, "")
     lines = [" ".join(line.split()) for line in out.splitlines()]
     assert lines[0] == "pocket_table after operation 6"
@@ -63,7 +63,7 @@ def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) 
         "R8 cube2 -> table made 6 [nz-A_fl px-A_px nx-A_nx py-A_py ny-A_ny]",
     ):
         assert line in lines
-    _, out, _ = run(capsys, "graph", "pocket_table", "--step", "3")
+    _, out, _ = run(capsys, "inspect", "graph", "pocket_table", "--step", "3")
     assert "lost" not in out
     assert "R5" not in out
 
@@ -71,7 +71,7 @@ def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) 
 def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = _castle_aside(tmp_path, 3.0)
     picture = tmp_path / "graph.svg"
-    asked = ("graph", "stick_in_tower", "--observation", str(path))
+    asked = ("inspect", "graph", "stick_in_tower", "--observation", str(path))
     code, out, err = run(capsys, *asked, "--json", "--out", str(picture))
     assert (code, err, out.count("\n")) == (0, "", 1)
     found = json.loads(out)
@@ -88,7 +88,8 @@ def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFix
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
     from apo_bench import Observation
-    from apo_bench.formats.json_forms import observation_form, write_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.observation_json import observation_form
     from apo_bench.geometry import pose
 
     scenario = load_scenario("stick_in_tower")
@@ -117,7 +118,7 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
     import mujoco
 
     path = tmp_path / "scene.xml"
-    code, out, _ = run(capsys, "scene", "stick_in_tower", "--out", str(path), "--clearance-mm", "0.4")
+    code, out, _ = run(capsys, "inspect", "scene", "stick_in_tower", "--out", str(path), "--clearance-mm", "0.4")
     assert code == 0
     assert str(path) in out
     assert mujoco.MjModel.from_xml_path(str(path)).nbody > 5
@@ -130,14 +131,14 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
 
     from apo_bench import Corrected, SweepConfig, TrialConfig, correct
     from apo_bench.cli.correct_command import correct_command
+    from apo_bench.cli.inspect_poses import poses_command
     from apo_bench.cli.setting_options import trial_options
-    from apo_bench.cli.show import show_command
     from apo_bench.records import CORRECTOR
 
     asked = signature(correct_command, eval_str=True).parameters["method"]
     assert asked.default is None
     assert f"default: {CORRECTOR}," in asked.annotation.__metadata__[0].help
-    commands = [signature(show_command).parameters["method"].default]
+    commands = [signature(poses_command).parameters["method"].default]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
     assert {*commands, *doors, TrialConfig("").method} == {CORRECTOR}
     assert CORRECTOR in SweepConfig(("stick_in_tower",)).method
@@ -145,7 +146,7 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
 
 
 def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "replay", "block_on_block", "--seed", "5", *QUICK, "--method", "paper", "--json")
+    code, out, err = run(capsys, "run", "block_on_block", "--seed", "5", *QUICK, "--method", "paper", "--json")
     assert (code, err) == (0, "")
     assert out.count("\n") == 1
     row = json.loads(out)
@@ -178,13 +179,13 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
 def test_a_table_is_replayed_like_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Of noise that is not stated nothing is assumed; the graph, which needs none, is printed all the same."""
     seen = Path(__file__).parents[2] / "docs" / "seen.csv"
-    measured = ("replay", "stick_in_tower", *QUICK, "--observation", str(seen), "--method", "contact", "--json")
+    measured = ("run", "stick_in_tower", *QUICK, "--observation", str(seen), "--method", "contact", "--json")
     code, out, err = run(capsys, *measured)
     assert (code, err, json.loads(out)["success"]) == (0, "", True)
     path = tmp_path / "bare.csv"
     path.write_text("\n".join(",".join(line.split(",")[:9]) for line in seen.read_text().splitlines()))
     _refused(run(capsys, *MEASURED, "--observation", str(path)), "standard deviations are missing; add columns")
-    code, out, err = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
+    code, out, err = run(capsys, "inspect", "graph", "stick_in_tower", "--observation", str(path))
     assert (code, err, "mm" in out) == (0, "", True)
 
 
@@ -226,10 +227,10 @@ def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixtu
     )  # fmt: skip
     assert (code, err) == (0, "")
     assert "0.0 to 65.8 %" in out
-    assert [row["seed"] for row in read_rows(out_folder)] == [3, 4]
+    assert [row["seed"] for row in read_records(out_folder)] == [3, 4]
     code, out, err = run(capsys, "report", str(out_folder))
     assert (code, err) == (0, "")
-    for name in ("tables/cells.csv", "figures/success_over_level.svg", "report.html"):
+    for name in ("tables/cells.csv", "figures/success_over_noise_level.svg", "report.html"):
         assert str(out_folder / name) in out
         assert (out_folder / name).stat().st_size > 0
 
@@ -258,12 +259,12 @@ def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("replay", "stick_in_towr"), "did you mean 'stick_in_tower'"),
-        (("replay",), "scenario"),
-        (("scene", "stick_in_tower", "--out", "/no/such/folder/a.xml"), "cannot be written"),
+        (("run", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("run",), "scenario"),
+        (("inspect", "scene", "stick_in_tower", "--out", "/no/such/folder/a.xml"), "cannot be written"),
         (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "0 trials"),
         (("report", "/no/such/folder"), "holds no sweep"),
-        (("graph", "pocket_table", "--out", "graph.pdf"), "ends in .svg or .png or .mmd"),
+        (("inspect", "graph", "pocket_table", "--out", "graph.pdf"), "ends in .svg or .png or .mmd"),
     ],
 )
 def test_a_wrong_request_is_one_sentence(

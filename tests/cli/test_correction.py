@@ -1,4 +1,4 @@
-"""`apo-bench explain` and `apo-bench correct`: what they print, what they write, how they end."""
+"""`apo-bench inspect dof` and `apo-bench correct`: what they print, what they write, how they end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import pytest
 from apo_bench import Correction, Observation, load_scenario, read_observation
 from apo_bench.assembly import largest_gap
 from apo_bench.cli import app as cli
-from apo_bench.formats.json_reading import read_plan
 from apo_bench.geometry import pose
 
 ROOT = Path(__file__).parents[2]
@@ -45,7 +44,7 @@ def aside(folder: Path, mm: float) -> Path:
 
 @pytest.mark.parametrize("name", ["gearbox", "wedge_under_roof"])
 def test_a_scenario_is_explained(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    code, out, err = run(capsys, "explain", name, "--json")
+    code, out, err = run(capsys, "inspect", "dof", name, "--json")
     assert (code, err, out.count("\n")) == (0, "", 1)
     found = json.loads(out)
     assert (found["schema"], found["scenario"]) == ("apo-bench/explanation/1", name)
@@ -55,7 +54,7 @@ def test_a_scenario_is_explained(capsys: pytest.CaptureFixture[str], name: str) 
 
 
 def test_an_explanation_in_words(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "explain", "vanished_fixture", "--deviation-mm", "2")
+    code, out, err = run(capsys, "inspect", "dof", "vanished_fixture", "--deviation-mm", "2")
     assert (code, err) == (0, "")
     lines = out.splitlines()
     total = "the contacts fix 21 of 30 directions; 9 are free and 12 of 33 equations redundant"
@@ -65,7 +64,7 @@ def test_an_explanation_in_words(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_free_directions_in_units(capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = run(capsys, "explain", "stick_in_tower", "--json", "--deviation-mm", "3", "--deviation-deg", "2")
+    _, out, _ = run(capsys, "inspect", "dof", "stick_in_tower", "--json", "--deviation-mm", "3", "--deviation-deg", "2")
     x, y, yaw = json.loads(out)["operations"][0]["free"]
     assert (x["name"], x["twist_mm_deg"], x["deviation_mm"]) == ("x", [1, 0, 0, 0, 0, 0], pytest.approx(3.0))
     assert (y["name"], y["deviation_mm"], y["with"]) == ("y", pytest.approx(np.sqrt(3.0)), [2, 3])
@@ -74,7 +73,7 @@ def test_free_directions_in_units(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_an_observation_is_explained_where_it_is_corrected_to(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "explain", "stick_in_tower", "--observation", str(SEEN), "--json")
+    code, out, err = run(capsys, "inspect", "dof", "stick_in_tower", "--observation", str(SEEN), "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert (found["rank"], found["freedom"]) == (13, 5)
@@ -90,11 +89,11 @@ def test_what_was_left_out_is_not_said_to_be_kept_as_seen(capsys: pytest.Capture
     """castle2 is seen 400 mm aside: its free direction x is known to no more than 50 mm, not to the 2 mm of the camera,
     and both programs correct by the same method."""
     path = str(aside(tmp_path, 400.0))
-    code, out, _ = run(capsys, "explain", "stick_in_tower", "--observation", path)
+    code, out, _ = run(capsys, "inspect", "dof", "stick_in_tower", "--observation", path)
     assert code == 0
     castle2 = next(line for line in out.splitlines() if line.startswith("2 castle2"))
     assert castle2.endswith("x free, chosen, 50.00 mm")
-    _, out, _ = run(capsys, "explain", "stick_in_tower", "--observation", path, "--json")
+    _, out, _ = run(capsys, "inspect", "dof", "stick_in_tower", "--observation", path, "--json")
     explained = json.loads(out)
     assert explained["left_out"] == [2]
     _, out, _ = run(capsys, "correct", "stick_in_tower", "--observation", path, "--json")
@@ -110,7 +109,7 @@ def test_the_picture_of_an_explanation_is_the_same_every_time(tmp_path: Path) ->
     """Two runs of the program. In one process what was drawn before can move a pixel of an edge."""
     pictures = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in pictures:
-        command = [sys.executable, "-m", "apo_bench", "explain", "stick_in_tower", "--out", str(path)]
+        command = [sys.executable, "-m", "apo_bench", "inspect", "dof", "stick_in_tower", "--out", str(path)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr, done.stdout.endswith(f"Wrote {path}\n")) == (0, "", True)
     a, b = (path.read_bytes() for path in pictures)
@@ -142,6 +141,12 @@ def test_assumed_noise_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert json.loads(run(capsys, *asked(path, "--json"))[1])["deviations_assumed"] is True
 
 
+def planned(path: Path) -> np.ndarray:
+    """The target poses in the file of a plan."""
+    entries = json.loads(path.read_text())["operations"]
+    return np.array([pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in entries])
+
+
 @pytest.mark.parametrize("ending", ["csv", "json"])
 def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"made.{ending}"
@@ -150,7 +155,7 @@ def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str],
     made = json.loads(out)
     scenario = load_scenario("stick_in_tower")
     seen = read_observation(SEEN, scenario)
-    goals = read_observation(path, scenario).poses if ending == "csv" else read_plan(path, scenario).target_poses
+    goals = read_observation(path, scenario).poses if ending == "csv" else planned(path)
     assert largest_gap(seen.assembly, seen.start, goals) < 1e-12
     stated = [pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in made["operations"]]
     assert goals == pytest.approx(np.array(stated), abs=1e-12)
@@ -193,7 +198,7 @@ def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.Captu
     code, out, err = run(capsys, *asked(path, "--method", "contact"))
     assert (code, err, "not_seen" in out) == (1, "", True)
     assert json.loads(run(capsys, *asked(path, "--method", "contact", "--json"))[1])["operations"] is None
-    code, out, err = run(capsys, "explain", "stick_in_tower", "--observation", str(path))
+    code, out, err = run(capsys, "inspect", "dof", "stick_in_tower", "--observation", str(path))
     assert (code, err, "x free, chosen, 50.00 mm" in out) == (0, "", True)
 
 
@@ -202,7 +207,7 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
     code, out, err = run(capsys, *asked(SEEN, "--method", method, "--json", "--out", str(tmp_path / "plan.json")))
     made = json.loads(out)
     assert (code, err, made["method"]) == (0, "", method)
-    assert len(read_plan(tmp_path / "plan.json").target_poses) == 3
+    assert len(planned(tmp_path / "plan.json")) == 3
 
 
 @pytest.mark.parametrize(
@@ -246,7 +251,7 @@ def test_a_corrector_is_not_believed(capsys: pytest.CaptureFixture[str]) -> None
 def test_no_simulator_is_needed() -> None:
     """Nor what draws; the commands read, correct and print without them. Part files alone are read by MuJoCo."""
     missing = ("mink", "dm_control", "matplotlib", "apo_bench.simulation")
-    every = (asked(SEEN), asked(SEEN, "--json"), ("explain", "stick_in_tower", "--observation", str(SEEN)))
+    every = (asked(SEEN), asked(SEEN, "--json"), ("inspect", "dof", "stick_in_tower", "--observation", str(SEEN)))
     code = f"import sys\nfor name in {missing!r}: sys.modules[name] = None\nfrom apo_bench.cli.app import main\n"
     done = _python(f"{code}for asked in {[list(one) for one in every]!r}: print('ended with', main(asked))")
     assert (done.returncode, done.stderr) == (0, "")

@@ -14,7 +14,8 @@ from apo_bench.cli.app import app, main
 from apo_bench.cli.completion import completion, offered_names
 from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
-from apo_bench.records.short_names import checked_contact_source, checked_method
+from apo_bench.records.contact_sources import checked_contact_source
+from apo_bench.records.methods import checked_method
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
@@ -47,7 +48,7 @@ def test_every_command_stands_under_one_heading() -> None:
     assert sorted(grouped) == sorted(name for words in EVERY if len(words) == 1 for name in words)
 
 
-@pytest.mark.parametrize("command", ["replay", "sweep"])
+@pytest.mark.parametrize("command", ["run", "sweep"])
 def test_every_option_stands_under_one_heading_and_whole(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     main([command, "--help"])
     said = capsys.readouterr().out
@@ -93,7 +94,7 @@ def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
     ("shell", "typed", "words", "not_offered"),
     [
         ("bash", "apo-bench sweep stick_in_tower --method uncorrected,contact", "none,contact-robust", "paper"),
-        ("fish", "apo-bench replay stick_in_tower --noise mega", "megapose-tless", "isotropic"),
+        ("fish", "apo-bench run stick_in_tower --noise mega", "megapose-tless", "isotropic"),
     ],
 )
 def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: str, not_offered: str) -> None:

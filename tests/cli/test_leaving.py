@@ -12,8 +12,8 @@ from apo_bench.cli.app import main
 @pytest.mark.parametrize(
     "words",
     [
-        "recognise block_on_block --noise leaving:Leaves",
-        "recognise block_on_block --noise leaving_module:any",
+        "detect-contacts block_on_block --noise leaving:Leaves",
+        "detect-contacts block_on_block --noise leaving_module:any",
         "arm check leaving:leave block_on_block --layouts 1",
     ],
 )

@@ -186,7 +186,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
 
 def test_the_page_on_plans_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     page = (ROOT / "docs" / "how" / "plans.md").read_text(encoding="utf-8")
-    assert run(capsys, "plan", "pocket_table")[1] in page
+    assert run(capsys, "inspect", "plan", "pocket_table")[1] in page
 
 
 def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -203,10 +203,10 @@ def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
         path = tmp_path / "own.toml"
         operation = f'[[operations]]\nmove = "stick"\ngoal = {{ at_mm = [0, 0, 25] }}\ncontacts = [{hole}{more}]\n'
         path.write_text(text + block.format("a", at) + block.format("b", -at) + operation, encoding="utf-8")
-        code, out, err = run(capsys, "plan", str(path))
+        code, out, err = run(capsys, "inspect", "plan", str(path))
         assert (code, err) == (0, "")
         assert words in out
-        code, out, _ = run(capsys, "plan", str(path), "--json")
+        code, out, _ = run(capsys, "inspect", "plan", str(path), "--json")
         assert json.loads(out)["steps"][0]["trouble"] in out
 
 
@@ -220,7 +220,9 @@ def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp
     for method, changed in (("uncorrected", [2]), ("contact", [1, 2, 3])):
         texts = []
         for path in (SEEN, aside):
-            code, out, err = run(capsys, "plan", "stick_in_tower", "--observation", str(path), "--method", method)
+            code, out, err = run(
+                capsys, "inspect", "plan", "stick_in_tower", "--observation", str(path), "--method", method
+            )
             assert (code, err) == (0, "")
             texts.append([line for line in out.splitlines() if line[:1].isdigit()])
         assert [i for i, (a, b) in enumerate(zip(*texts, strict=True), start=1) if a != b] == changed
@@ -228,7 +230,7 @@ def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp
 
 def test_a_plan_that_takes_apart(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(
-        capsys, "plan", "stick_in_tower", "--observation", str(SEEN), "--method", "paper-track", "--json"
+        capsys, "inspect", "plan", "stick_in_tower", "--observation", str(SEEN), "--method", "paper-track", "--json"
     )
     steps = json.loads(out)["steps"]
     assert code == 0
@@ -310,7 +312,15 @@ def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
     out = tmp_path / "robot.json"
     frames = tmp_path / "robot.toml"
     frames.write_text('schema = "apo-bench/robot/1"\nquaternion = "wxyz"\n', encoding="utf-8")
-    seen = ["plan", "stick_in_tower", "--observation", str(ROOT / "docs" / "seen.csv"), "--method", "contact"]
+    seen = [
+        "inspect",
+        "plan",
+        "stick_in_tower",
+        "--observation",
+        str(ROOT / "docs" / "seen.csv"),
+        "--method",
+        "contact",
+    ]
     assert cli.main([*seen, "--robot", str(out), "--frames", str(frames)]) == 0
     found = json.loads(out.read_text(encoding="utf-8"))
     assert found["poses"]["quaternion"] == "wxyz"
@@ -321,7 +331,7 @@ def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
     assert with_acts == found
     capsys.readouterr()
     for wrong, sentence in (
-        (["plan", "stick_in_tower", "--robot", str(out)], "--robot was given without --observation"),
+        (["inspect", "plan", "stick_in_tower", "--robot", str(out)], "--robot was given without --observation"),
         ([*seen, "--frames", str(frames)], "was given without --robot"),
         ([*seen, "--acts", "external"], "--acts external was given without --robot"),
     ):

@@ -12,7 +12,7 @@ from apo_bench import load_scenario, read_observation
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.scenario.layout import layout_at
-from benchmarks.recording_forms import FORMS, Tracked
+from tests.importers.recording.log_forms import FORMS, Tracked
 from tests.recorded import CAMERA, seen
 
 NAME = "block_on_block"

@@ -38,7 +38,7 @@ COMMANDS = {
     "leaderboard entries --out page.md": "page.md page.png",
     "report rows --pictures 0": (
         "rows/report.html rows/tables/rows.parquet rows/tables/cells.csv "
-        "rows/tables/cells.parquet rows/figures/success_over_level.svg"
+        "rows/tables/cells.parquet rows/figures/success_over_noise_level.svg"
     ),
     "compare rows rows --out compared": "compared/compare.html compared/agreement.csv compared/agreement.parquet",
 }

@@ -10,14 +10,14 @@ from apo_bench.assembly import Outcome
 from apo_bench.benchmark.analysis import tally
 from apo_bench.cli.terminal import print_cells
 from apo_bench.cli.trial_text import print_row
-from apo_bench.trial.outcome_columns import result
+from apo_bench.trial.endings import end_record
 from tests.benchmark.analysis.test_rates import row
 
 REACHED = {"worst_gap_mm": 7.0, "least_overlap": 1.0}
 
 
 def told(capsys: pytest.CaptureFixture[str], success: bool, **more: Any) -> str:
-    end = result(Outcome("judge", "gap", None, "a gap is left"), success=success)
+    end = end_record(Outcome("judge", "gap", None, "a gap is left"), success=success)
     print_row({**row("contact", 0, success, pose_source="noise-model"), **end, **more})  # type: ignore[typeddict-item]
     return capsys.readouterr().out
 

@@ -13,10 +13,10 @@ from apo_bench import ContactCorrector, Correction, InputError, Observation, cor
 from apo_bench.assembly import Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
+from apo_bench.correction.batches import BATCH
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.correctors import BATCH
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.play import laid_contacts
+from apo_bench.correction.solvers.projected_contacts import project_vertices
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.checks.test_consistency import shifted
@@ -61,7 +61,7 @@ def test_many_are_one_after_the_other(build: Callable[[], scenes.Scene]) -> None
 
 def laid_together(scene: scenes.Scene, goals: Array) -> CompactEquations:
     start = np.array([scene.start[part] for part in scene.assembly.solids])
-    return laid_contacts(scene.assembly, start, pattern(scene.assembly).plane, goals).system
+    return project_vertices(scene.assembly, start, pattern(scene.assembly).plane, goals).system
 
 
 @pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])

@@ -12,8 +12,8 @@ import pytest
 
 from apo_bench import InputError, Scene, TrialConfig, build_scene, correct, load_scenario
 from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import simulate_demonstration
-from apo_bench.trial.trial import trial_row
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -55,7 +55,7 @@ class Asking:
     def __call__(self, seen):
         return seen.poses
 
-    def looking(self, seen, look):
+    def correct_and_reobserve(self, seen, look):
         raise ValueError(f"{look.left} looks")
 
 asking = Asking()
@@ -65,7 +65,7 @@ MISBEHAVED = {
     "raises": r"it raised ZeroDivisionError\(<object object at 0x\.\.\.>\)",
     "halves": r"half a letter: \? and \\x1b\[31m red",
     "nonsense": "returned a str",
-    "imaginary": "returned complex numbers as goals; return real ones",
+    "imaginary": "returned complex numbers as poses; return real ones",
     "wide": r"a position of 1e\+09 m",
     "odd": "the corrector 'users:odd' failed: freed of Correction must be a list",
     "red": r"returned '\\x1b\[31m red' as its sentence",
@@ -91,7 +91,7 @@ def scene() -> Scene:
 
 def row_of(scene: Scene, method: str, **more: Any) -> dict[str, Any]:
     settings = TrialConfig("block_on_block", human_error_scale=0.0, method=method, seed=1, **more)
-    return dict(trial_row(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
+    return dict(record_trial(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
 
 
 def test_a_function_named_by_its_module_is_asked_as_one_by_name() -> None:

@@ -11,6 +11,7 @@ import pytest
 from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario, replay
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.trial.stages import LAYOUT, Attempt, replay_and_judge, stream
 
 SEED = 3
@@ -34,7 +35,7 @@ def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Seque
         if undo:
             wrong_mm = {j: w for j, w in wrong_mm.items() if j != k}
     plan = Plan(scene.scenario.assembly, layout.start, layout.poses, schedule, np.array(targets))
-    return replay_and_judge(plan, scene, layout.poses, fidelity="near-contact")
+    return replay_and_judge(plan, scene, layout.poses, config=ExecutionConfig("near-contact"))
 
 
 def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:

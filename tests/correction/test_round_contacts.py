@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from apo_bench import Assembly, ContactCorrector, InputError, Observation, correct, correct_many, explain
-from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
+from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, project_round_faces
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
@@ -152,7 +152,7 @@ def test_a_missing_view_is_inferred_from_a_round_contact():
     """The taper says where the pin is, all but its turn; the shaft leaves where along its hole, and which end is up."""
     for kind, free in (("shaft in hole", [2, 5]), ("cone in cone", [5]), ("shaft on plane", [1, 2, 3, 5])):
         observation, truth = case(kind, mm=0.1, deg=0.1)
-        made = correct(replace(observation, seen=np.array([True, False])), "contact-robust")
+        made = correct(replace(observation, observed=np.array([True, False])), "contact-robust")
         assert made.ok, made.sentence
         assert made.left_out == (1,)
         assert made.believed.assembly is observation.assembly
@@ -176,7 +176,7 @@ def test_a_wrong_relation_is_named_as_it_was_given():
     assert {c for suspect in made.test.suspects for c in suspect.contacts} == {
         bore, top, touching("plate.bottom", "table.top"),
     }  # fmt: skip
-    assert largest_gap(lowered(observation.assembly), start, made.poses) > 1e-3
+    assert largest_gap(project_round_faces(observation.assembly), start, made.poses) > 1e-3
 
 
 def test_cones_must_oppose_and_axes_need_not():
@@ -207,9 +207,9 @@ def test_far_from_the_truth_goals_are_found_and_none_longer_than_it(kind):
 
 def test_without_round_contacts_nothing_is_lowered_or_kept():
     assembly = shown(BOXES[0])[0].assembly
-    assert lowered(assembly) is assembly
+    assert project_round_faces(assembly) is assembly
     copy = replace(assembly)
-    lowered(copy)
+    project_round_faces(copy)
     kept = weakref.ref(copy)
     del copy
     gc.collect()
@@ -222,7 +222,7 @@ def test_a_hole_over_a_shaft_and_a_shaft_in_a_hole_are_the_same():
     other = scene(type(bore)(bore.environment, bore.manipulated), at=IN_BORE)[0]
     given, swapped = (seen(a, start, truth, np.random.default_rng(0)) for a in (assembly, other))
     np.testing.assert_allclose(correct(given).poses, correct(swapped).poses, atol=1e-12)
-    assert {lowered(other).given(r.contact) for r in lowered(other).relations()} == {
+    assert {project_round_faces(other).given(r.contact) for r in project_round_faces(other).relations()} == {
         contact for operation in other.operations for contact in operation.contacts
     }
 
@@ -233,8 +233,12 @@ def test_play_of_a_round_fit_is_a_disc(radius, fit, play):
     bore = touching("pin.shaft", "plate.bore")
     assembly, start, truth = scene(bore, at=IN_BORE, fit=fit, radius=radius * MM)
     assert assembly.play(bore, 0.25e-3) == pytest.approx(play * MM)
-    S = fit_covariance(lowered(assembly), 0.25e-3)
-    number = [i for i, r in enumerate(lowered(assembly).relations()) if lowered(assembly).given(r.contact) == bore]
+    S = fit_covariance(project_round_faces(assembly), 0.25e-3)
+    number = [
+        i
+        for i, r in enumerate(project_round_faces(assembly).relations())
+        if project_round_faces(assembly).given(r.contact) == bore
+    ]
     rows = S[np.ix_([3 * i for i in number], [3 * i for i in number])]
     np.testing.assert_allclose(rows, np.eye(2) * 2 * (play * MM) ** 2 / 4, rtol=1e-9, atol=1e-20)
     gaps = {bore: Gap("clearance")}
@@ -256,7 +260,7 @@ def test_a_cone_that_recedes_lets_its_shaft_in_deeper():
     assembly = scene(sits, at=CONTACTS["cone in cone"][1])[0]
     plate = assembly.solids["plate"]
     fit = replace(plate, rounds={**plate.rounds, "sink": replace(plate.rounds["sink"], fit=True)})
-    low = lowered(replace(assembly, solids={**assembly.solids, "plate": fit}))
+    low = project_round_faces(replace(assembly, solids={**assembly.solids, "plate": fit}))
     plays = [low.play(r.contact, 0.1e-3) for r in low.relations() if low.given(r.contact) == sits]
     assert plays == pytest.approx([0.1e-3, 0.1e-3, np.sqrt(2) * 0.1e-3])
 
@@ -322,7 +326,7 @@ def test_errors_that_operations_share_are_used():
     goals = off @ truth
     Ad = pose.adjoint(pose.inverse(goals))
     both = replace(
-        observation, goals=goals, shared=(shared,), covariance=Ad @ C @ np.swapaxes(Ad, 1, 2) + np.eye(6) * 1e-10
+        observation, poses=goals, shared=(shared,), covariance=Ad @ C @ np.swapaxes(Ad, 1, 2) + np.eye(6) * 1e-10
     )
     made = correct(both)
     assert made.ok, made.sentence
@@ -382,7 +386,7 @@ def test_a_corrector_of_ones_own_gets_the_round_faces():
 
 def test_sheets_are_of_no_part():
     observation, _ = case("shaft in hole")
-    low = lowered(observation.assembly)
+    low = project_round_faces(observation.assembly)
     assert low.solids["plate"] is observation.assembly.solids["plate"]
     assert all("|" in of.face for r in low.relations()[1:] for of in r.contact)
     assert PartFace("plate", "bore") not in low.sheets

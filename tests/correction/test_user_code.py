@@ -92,8 +92,8 @@ def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 
 @pytest.mark.parametrize("name", RAISED)
 def test_a_card_and_a_replay_of_noise_that_raises(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    refused(["noise", "card", f"users_code:{name}"], RAISED[name], capsys)
-    trial = ["replay", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld"]
+    refused(["noise", "show", f"users_code:{name}"], RAISED[name], capsys)
+    trial = ["run", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld"]
     refused([*trial, "--noise", f"users_code:{name}"], RAISED[name], capsys)
 
 
@@ -123,7 +123,7 @@ def test_an_environment_whose_noise_raises() -> None:
 
 
 def test_relations_that_raise(capsys: pytest.CaptureFixture[str]) -> None:
-    trial = ["replay", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld", "--method", "contact"]
+    trial = ["run", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld", "--method", "contact"]
     words = "the relations 'relations' failed: told nothing; mend it, or use another."
     refused([*trial, "--contact-source", "users_code:relations"], words, capsys)
 

@@ -37,20 +37,20 @@ PARSED_ONLY: Mapping[str, str] = {
     r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
     r"noise fit ": "needs the results of a pose estimator; tests/perception/observation/test_fit.py runs it",
-    r"replay .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
-    r"replay .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
-    r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
-    r"replay .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
-    r"replay .*--pose-source depth-camera": "many depth images; tests/depth_camera runs them",
-    r"eye ": "many depth images; tests/depth_camera runs them",
-    r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
+    r"run .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
+    r"run .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
+    r"run .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
+    r"run .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
+    r"run .*--pose-source depth-camera": "many depth images; tests/depth_camera runs them",
+    r"inspect depth ": "many depth images; tests/depth_camera runs them",
+    r"(view |run .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
     r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
     r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; tests/cad reads such files",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
-    r"noise card ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
-    r"replay stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; replays of other pages run",
+    r"noise show ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
+    r"run stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; replays of other pages run",
 }
 """Commands that are not run, by how they begin, and why."""
 
@@ -106,7 +106,7 @@ def test_the_command_line_takes_every_command_of_the_pages(line: Line) -> None:
 
 def test_an_option_that_is_not_there_would_be_noticed() -> None:
     with pytest.raises(Exception, match="--nothing"):
-        test_the_command_line_takes_every_command_of_the_pages(Line(PAGES[0], ("scenarios", "--nothing")))
+        test_the_command_line_takes_every_command_of_the_pages(Line(PAGES[0], ("scenario", "list", "--nothing")))
 
 
 def test_each_reason_not_to_run_a_command_is_of_a_command() -> None:

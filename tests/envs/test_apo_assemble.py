@@ -60,6 +60,6 @@ def test_the_last_part_dropped_before_its_mouth_makes_the_whole_wrong() -> None:
 
 
 def test_settings_that_are_of_one_operation_alone_are_not_taken() -> None:
-    for name in ("operation", "probing"):
+    for name in ("operation", "probe"):
         with pytest.raises(InputError, match=f"{name} was given; all operations are done"):
             APOAssemble(scenario="block_on_block", **{name: 1})

@@ -23,7 +23,7 @@ from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObser
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialConfig, correct, run_trial
 from apo_bench.assembly import Outcome, Step
-from apo_bench.envs import episode, starts
+from apo_bench.envs import episode, robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
@@ -33,7 +33,7 @@ from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.stages import SimulatedDemonstration, reobservations_of, simulate_demonstration
 
 SEED = 5
-REPLAY = "apo_bench.envs.starts.replay_and_judge"
+REPLAY = "apo_bench.envs.robot.replay_and_judge"
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +82,9 @@ def test_reset_fits_the_spaces(env: APOReplay) -> None:
     }
     assert all(np.isfinite(box.low).all() and np.isfinite(box.high).all() for box in _boxes(env))
     assert env.action_space.shape == (3, 6)
-    np.testing.assert_array_equal(seen["poses"], pose.pack(env.seen.poses))
-    np.testing.assert_array_equal(seen["covariance"], env.seen.covariance)
-    assert env.seen.assembly is env.assembly
+    np.testing.assert_array_equal(seen["poses"], pose.pack(env.observation.poses))
+    np.testing.assert_array_equal(seen["covariance"], env.observation.covariance)
+    assert env.observation.assembly is env.assembly
     assert info == {"demonstration": "ok"}
     assert env.trial == SEED
 
@@ -114,7 +114,7 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
 
 
 def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
-    """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
+    """Zeros, corrected, are method `paper` of `apo-bench run --seed`."""
     row = run_trial(TrialConfig("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
     assert row["success"] is True
     _check_episode(apo_bench.Corrected(small, "paper"), row)
@@ -153,8 +153,8 @@ def test_an_action_moves_each_goal_in_the_frame_of_its_part(
     watched.step(twist)
     watched.reset(seed=SEED)
     watched.step(zeros(watched))
-    np.testing.assert_allclose(asked[0].goals, watched.seen.poses @ pose.exp(twist), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(asked[1].goals, watched.seen.poses)
+    np.testing.assert_allclose(asked[0].target_poses, watched.observation.poses @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].target_poses, watched.observation.poses)
 
 
 def _nothing() -> Any:
@@ -171,14 +171,14 @@ def test_correction_aims_and_an_action_composes_on_top(watched: APOReplay, monke
     corrected = apo_bench.Corrected(watched, "apo_bench.correction.baselines.paper:paper")
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "converged"
-    assert not np.array_equal(seen["poses"], pose.pack(watched.seen.poses))
+    assert not np.array_equal(seen["poses"], pose.pack(watched.observation.poses))
     twist = np.full((3, 6), 0.01)
     after, *_ = corrected.step(twist)
-    np.testing.assert_allclose(asked[0].goals, pose.unpack(seen["poses"]) @ pose.exp(twist), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(asked[0].target_poses, pose.unpack(seen["poses"]) @ pose.exp(twist), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(after["poses"], seen["poses"])
     watched.reset(seed=SEED)
     watched.step(zeros(watched))
-    np.testing.assert_array_equal(asked[1].goals, watched.seen.poses)
+    np.testing.assert_array_equal(asked[1].target_poses, watched.observation.poses)
 
 
 def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +188,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
         def __call__(self, seen: Observation) -> Any:
             return pytest.fail("it can look again")
 
-        def looking(self, seen: Observation, look: Any) -> Any:
+        def correct_and_reobserve(self, seen: Observation, look: Any) -> Any:
             again.append(look([1]))
             return correct(seen, "contact")
 
@@ -198,13 +198,13 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
     corrected = apo_bench.Corrected(made, Asks())
     corrected.reset(seed=SEED)
     assert again[0].observed.tolist() == [False, bool(again[0].observed[1])]
-    assert not np.array_equal(again[0].poses[1], made.seen.poses[1])
-    assert (made.look.left, made.look.reobservations) == (1, 1)
+    assert not np.array_equal(again[0].poses[1], made.observation.poses[1])
+    assert (made.reobserve.left, made.reobserve.reobservations) == (1, 1)
     copied = copy.deepcopy(made)
-    second = made.look([0, 1])
-    np.testing.assert_array_equal(copied.look([0]).poses, second.poses)
+    second = made.reobserve([0, 1])
+    np.testing.assert_array_equal(copied.reobserve([0]).poses, second.poses)
     with pytest.raises(InputError, match="none is left"):
-        made.look([0])
+        made.reobserve([0])
     corrected.reset(seed=SEED)
     np.testing.assert_array_equal(again[1].poses, again[0].poses)
     simulated = demonstrated(made._scene, 1.0, SEED, "noise")
@@ -217,7 +217,7 @@ def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch
     corrected = apo_bench.Corrected(watched, gives_up)
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "inconsistent"
-    np.testing.assert_array_equal(seen["poses"], pose.pack(watched.seen.poses))
+    np.testing.assert_array_equal(seen["poses"], pose.pack(watched.observation.poses))
     _, reward, terminated, _, info = corrected.step(zeros(watched))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "correct", "inconsistent")
     assert "failure_prediction" not in info
@@ -239,16 +239,16 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
     corrected = apo_bench.Corrected(watched, rebuilds)
     corrected.reset(seed=SEED)
-    made = rebuilds(watched.seen)
+    made = rebuilds(watched.observation)
     twist = np.linspace(-0.02, 0.02, 18).reshape(3, 6)
     corrected.step(twist)
     corrected.reset(seed=SEED)
     corrected.step(zeros(watched))
     assert asked[0].schedule == asked[1].schedule == made.schedule
     moved = made.step_poses @ pose.exp(twist)[[0, 1, 1, 1, 2]]
-    np.testing.assert_allclose(asked[0].targets, moved, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(asked[0].goals, made.poses @ pose.exp(twist), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(asked[1].targets, made.step_poses)
+    np.testing.assert_allclose(asked[0].step_poses, moved, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(asked[0].target_poses, made.poses @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].step_poses, made.step_poses)
 
 
 def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
@@ -282,7 +282,7 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     assert info["stage"] in (*outcomes.STAGES, "done")
     assert info["code"] in outcomes.CODES
     assert all(isinstance(value, (bool, str, int, type(None))) for value in info.values())
-    assert {f.name for f in fields(watched.seen)} == {
+    assert {f.name for f in fields(watched.observation)} == {
         *("assembly", "start", "poses", "covariance", "observed", "gap_m", "play_m", "outliers", "shared", "tails")
     }
 
@@ -290,12 +290,12 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
 def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     watched.reset(seed=SEED)
     again = (Step(0), Step(0, undo=True)) * 600
-    watched.aim(watched.seen.poses, (*again, *(Step(k) for k in range(3))))
+    watched.aim(watched.observation.poses, (*again, *(Step(k) for k in range(3))))
     monkeypatch.setattr(replays, "moves", _nothing)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()
-    monkeypatch.setattr(starts, "LONGEST_REPLAY_S", 5.0)
+    monkeypatch.setattr(robot, "LONGEST_REPLAY_S", 5.0)
     watched.reset(seed=SEED)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
@@ -308,7 +308,7 @@ def test_one_step_is_one_episode(watched: APOReplay) -> None:
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         fresh.step(zeros(watched))
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
-        _ = fresh.seen
+        _ = fresh.observation
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         _ = fresh.trial
     watched.reset(seed=SEED)
@@ -378,7 +378,7 @@ def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
     shown = module.simulate_demonstration(watched._scene, 1.0, SEED, "noise")
     failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
     monkeypatch.setattr(module, "simulate_demonstration", lambda *_: failed)
-    with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row went wrong at carelessness"):
+    with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row failed with a human error scale"):
         watched.reset()
 
 
@@ -453,10 +453,10 @@ def test_a_picture_without_a_display(small: APOReplay) -> None:
 
 def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    true = starts.replay_and_judge
+    true = robot.replay_and_judge
 
     def replay_and_judge(*args: Any, **more: Any) -> Any:
-        asked.append(args[4])
+        asked.append(args[4].fidelity)
         return true(*args, **more)
 
     monkeypatch.setattr(REPLAY, replay_and_judge)
@@ -464,7 +464,7 @@ def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> 
     made = APOReplay("block_on_block", fidelity="near-contact")
     made.reset(seed=SEED)
     *_, info = made.step(zeros(made))
-    assert (asked, info["code"]) == (["contact"], "ok")
+    assert (asked, info["code"]) == (["near-contact"], "ok")
     assert info["is_success"] is info["success"] is row["success"]
 
 

@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 from apo_bench import InputError, correct, observe
 from apo_bench.assembly import Step
 from apo_bench.envs.apo_track import DO, FINISH, UNDO, APOTrack, follow
-from apo_bench.envs.tracking import contact_policy, first_seen, paper_track_policy
+from apo_bench.envs.tracking import contact_policy, observe_first, paper_track_policy
 from apo_bench.geometry import pose
 from tests import scenes
 
@@ -50,7 +50,7 @@ def test_an_operation_is_shown_when_the_one_before_is_done(env: APOTrack) -> Non
     np.testing.assert_array_equal(first["poses"][1:], [[0, 0, 0, 1, 0, 0, 0]] * 2)
     assert not first["covariance"][1:].any()
     assert not first["observed"][1:].any()
-    assert len(env.tracked.seen.poses) == 1
+    assert len(env.tracked.observation.poses) == 1
     second, reward, *over, info = act(env, DO)
     assert (second["shown"].tolist(), second["done"].tolist()) == ([1, 1, 0], [1, 0, 0])
     assert (reward, over, info["action_mask"].tolist()) == (0.0, [False, False], [1, 1, 1])
@@ -103,12 +103,12 @@ def test_the_corrector_of_the_paper_is_a_policy(name: str) -> None:
     env = APOTrack(name, replay=False)
     for seed in range(2):
         env.reset(seed=seed)
-        asked = correct(env._base.seen, "paper-track")
+        asked = correct(env._base.observation, "paper-track")
         reward, info = follow(env, paper_track_policy)
         assert (reward, info["code"], asked.status) == (1.0, "ok", "converged")
         assert env.schedule == asked.schedule
         np.testing.assert_allclose(env.placed, asked.poses, rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(np.array(env._targets), asked.step_poses, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(np.array(env._step_poses), asked.step_poses, rtol=0.0, atol=1e-9)
 
 
 def test_without_correction_contacts_are_open(env: APOTrack) -> None:
@@ -158,8 +158,8 @@ def test_the_end_is_replayed_with_everything_that_was_undone(monkeypatch: pytest
 def test_nothing_is_known_of_what_was_not_seen_yet(noise: str) -> None:
     shown = scenes.shown(scenes.stick_in_tower())
     whole = observe(shown, noise, np.random.default_rng(1))
-    part = first_seen(whole, 2)
+    part = observe_first(whole, 2)
     assert len(part.assembly) == len(part.poses) == len(part.covariance) == len(part.observed) == 2
     assert {k for error in part.shared for k in error.operations} <= {0, 1}
     assert correct(part, "contact").poses.shape == (2, 4, 4)
-    assert correct(first_seen(whole, 3), "contact").poses.tobytes() == correct(whole, "contact").poses.tobytes()
+    assert correct(observe_first(whole, 3), "contact").poses.tobytes() == correct(whole, "contact").poses.tobytes()

@@ -16,7 +16,7 @@ import apo_bench
 from apo_bench import Correction, InputError, Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.spaces import as_seen_entries
+from apo_bench.envs.spaces import observation_entries
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 
 SEED = 5
@@ -70,17 +70,17 @@ def test_a_copy_goes_on_as_the_original_would(way: str, noise_level: float) -> N
 
 
 def test_a_copy_is_one_of_its_own(env: APOReplay) -> None:
-    kept = env.seen.poses.copy()
+    kept = env.observation.poses.copy()
     other = copy.deepcopy(env)
     other.reset(seed=SEED + 1, options={"noise_level": 3.0, "clearance_mm": 0.5})
     assert (env.trial, other.trial) == (SEED, SEED + 1)
     assert env._scene.clearance_mm != other._scene.clearance_mm
-    np.testing.assert_array_equal(env.seen.poses, kept)
+    np.testing.assert_array_equal(env.observation.poses, kept)
 
 
 def test_what_is_frozen_is_frozen_in_the_copy(env: APOReplay) -> None:
     copied = WAYS["pickle"](env)
-    seen: Observation = copied.seen
+    seen: Observation = copied.observation
     assert seen.assembly is copied.assembly
     face = next(iter(copied.assembly.solids["stick"].faces.values()))
     for array in (seen.poses, seen.covariance, seen.observed, *seen.start.values(), face.outline, face.normal):
@@ -118,7 +118,7 @@ def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> 
     worse = pickle.loads(pickled).reset(seed=SEED, options={"noise_level": 3})
     assert same(worse, APOReplay(SMALL, pose_source="depth-camera", noise_level=3).reset(seed=SEED))
     assert not same(worse, usual)
-    with pytest.raises(InputError, match="one number is allowed, mm per ray"):
+    with pytest.raises(InputError, match="give one number, mm per ray"):
         env.reset(options={"noise_level": (1, 1)})
 
 
@@ -145,7 +145,7 @@ def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> None:
     """It is that of an environment which was made with them, and the next one is as ever."""
     other = copy.deepcopy(env)
-    usual = as_seen_entries(env.seen), {"demonstration": "ok"}
+    usual = observation_entries(env.observation), {"demonstration": "ok"}
     got = other.reset(seed=SEED, options=options)
     assert same(got, APOReplay(grasp="weld", **options).reset(seed=SEED))
     assert not same(got, usual)
@@ -155,10 +155,10 @@ def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'level'. Known: careless, clearance_mm, level"),
-        ([("noise_level", 1)], "a dict with level, careless, clearance_mm is allowed"),
-        ({"noise_level": None}, "the level None was given"),
-        ({"noise_level": 2, "human_error_scale": 11}, "carelessness of 11"),
+        ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'noise_level'. Known: clearance_mm, human"),
+        ([("noise_level", 1)], "a dict with trial, noise_level, human_error_scale, clearance_mm is"),
+        ({"noise_level": None}, "the noise level None was given"),
+        ({"noise_level": 2, "human_error_scale": 11}, "human error scale of 11"),
         ({"noise_level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
     ],
 )

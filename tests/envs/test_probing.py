@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from apo_bench import TrialConfig
-from apo_bench.envs import starts
+from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import Corrected
 from apo_bench.errors import InputError
-from apo_bench.trial import trial
+from apo_bench.trial import run
 
 SCENARIO = "block_on_block"
 
@@ -18,38 +18,37 @@ SCENARIO = "block_on_block"
 def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def noted(*plain, probing=None, spiral=False, **named):  # type: ignore[no-untyped-def]
-        given.append((probing, spiral or plain[-1] is True))
+    def noted(*plain):  # type: ignore[no-untyped-def]
+        given.append(plain[4])
         raise InterruptedError
 
-    for where in (starts, trial):
+    for where in (robot, run):
         monkeypatch.setattr(where, "replay_and_judge", noted)
-    settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
-    env = Corrected(APOReplay(SCENARIO, probing=True, **settings))
+    settings = {"robot_error": "hand_eye:0.5/0.1", "ft_sensor": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
+    env = Corrected(APOReplay(SCENARIO, probe=True, **settings))
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))
     with pytest.raises(InterruptedError):
-        trial.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
-    (ours, spiral), (theirs, also_searches) = given
-    assert spiral
-    assert also_searches
-    assert (ours.wrench, ours.seed, ours.acts) == (theirs.wrench, theirs.seed, theirs.acts)
-    assert ours.wrench == "0.5/0.025"
+        run.run_trial(TrialConfig(SCENARIO, seed=4, method="contact-robust+probe", **settings))
+    assert all(config.spiral for config in given)
+    ours, theirs = (config.probing for config in given)
+    assert (ours.ft_sensor, ours.seed, ours.actions) == (theirs.ft_sensor, theirs.seed, theirs.actions)
+    assert ours.ft_sensor == "0.5/0.025"
     np.testing.assert_array_equal(ours.slip, theirs.slip)
     for name in ("mean", "sigmas", "middle"):
-        np.testing.assert_array_equal(getattr(ours.belief, name), getattr(theirs.belief, name))
+        np.testing.assert_array_equal(getattr(ours.estimate, name), getattr(theirs.estimate, name))
 
 
 def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def noted(*plain, **named):  # type: ignore[no-untyped-def]
-        given.append((named["probing"], named["searches"]))
+    def noted(*plain):  # type: ignore[no-untyped-def]
+        given.append((plain[4].probing, plain[4].spiral))
         raise InterruptedError
 
-    monkeypatch.setattr(starts, "replay_and_judge", noted)
-    env = APOReplay(SCENARIO, wrench="joint-torque", assumed_robot_error="unknown")
+    monkeypatch.setattr(robot, "replay_and_judge", noted)
+    env = APOReplay(SCENARIO, ft_sensor="joint-torque", assumed_robot_error="unknown")
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape, dtype=np.float32))
@@ -57,7 +56,7 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"), [("wrench", "unknown wrench sensor"), ("assumed_robot_error", "unknown stated error")]
+    ("wrong", "said"), [("ft_sensor", "unknown wrench sensor"), ("assumed_robot_error", "unknown stated error")]
 )
 def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -65,12 +64,12 @@ def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
 
 
 def test_whether_it_feels_is_true_or_false() -> None:
-    with pytest.raises(InputError, match="feels of APOReplay must be True or False, got 'no'"):
-        APOReplay(SCENARIO, probing="no")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="wrench of APOReplay must be a text, got None"):
-        APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="probe of APOReplay must be True or False, got 'no'"):
+        APOReplay(SCENARIO, probe="no")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="ft_sensor of APOReplay must be a text, got None"):
+        APOReplay(SCENARIO, ft_sensor=None)  # type: ignore[arg-type]
 
 
 def test_pads_that_do_not_close_square_nothing() -> None:
-    with pytest.raises(InputError, match="the grasp 'weld' was given for a robot that feels"):
-        APOReplay(SCENARIO, probing=True, grasp="weld")
+    with pytest.raises(InputError, match="the grasp 'weld' was given for a method with .probe"):
+        APOReplay(SCENARIO, probe=True, grasp="weld")

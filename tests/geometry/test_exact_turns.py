@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
 from apo_bench.perception.observation.models.facts import NoiseLevel
 from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from tests import scenes
 from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, MM, part, pin, plate, ring, scene, tube, wall
@@ -124,9 +124,9 @@ def pinned():
     given, at, _ = CONTACTS["shaft in hole"]
     assembly, start, truth = scene(given, at=at)
     demonstration = shown("block_on_block")[2]
-    human_error_scale = np.zeros((2, 6, 6))
+    error = np.zeros((2, 6, 6))
     return assembly, replace(
-        demonstration, assembly=assembly, start=start, goals=truth, final=start, human_error_scale=human_error_scale
+        demonstration, assembly=assembly, start=start, poses=truth, final=start, human_error_covariance=error
     )
 
 

@@ -9,12 +9,12 @@ import pytest
 
 from apo_bench.geometry import PAD_M, Box, Solid, held_span, holds_whole, intrusion_depths, is_held
 from apo_bench.geometry.pads import holds
-from apo_bench.scenario.parts.making import Frustum, extrude, polygon, rectangle, shaft, solid_of, turned
+from apo_bench.scenario.parts.making import Frustum, extrude, polygon, rectangle, revolve, shaft, solid_of
 
 OPENING_M = 0.046
 L = extrude(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)
 U = extrude(polygon((0, 0), (80, 0), (80, 40), (68, 40), (68, 10), (12, 10), (12, 40), (0, 40)), 0, 30)
-BUSH = turned(
+BUSH = revolve(
     [Frustum(0, 3, 9, name="flange"), Frustum(3, 20, 7, name="outer")], [Frustum(0, 20, 5, name="inner", fit=True)]
 )
 PARTS = {

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Solid, pose, revolution, turned_alike
+from apo_bench.geometry import Solid, pose, revolution, turn_alike
 from tests import rounds
 
 
@@ -29,7 +29,7 @@ def test_the_turn_is_the_least_there_is(seed: int, part: Solid) -> None:
     assert found is not None
     T = pose.exp(rng.standard_normal(6))
     true = pose.exp(rng.standard_normal(6))
-    best = turned_alike(part, T, true)
+    best = turn_alike(part, T, true)
 
     def turn(X: np.ndarray) -> float:
         return float(np.linalg.norm(pose.log(pose.inverse(true) @ X)[3:]))

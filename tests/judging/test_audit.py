@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import pose, revolution, symmetries
-from apo_bench.judging.verdict import fixtures
+from apo_bench.judging.finished import fixtures
 from tests import audited_more_rounds, audited_rounds, audited_wholes, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS
 from tests.audited_states import LOOSE, Loose, Seen, aligned_twice, kept, stop_for_two, used_later

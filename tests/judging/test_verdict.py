@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,18 +13,16 @@ from hypothesis import strategies as st
 from apo_bench import Criteria, Verdict, judge
 from apo_bench.assembly import Reached, placements
 from apo_bench.geometry import pose
-from apo_bench.judging.contacts import FAULTS
-from apo_bench.judging.verdict import fixtures
+from apo_bench.judging.finished import fixtures
+from apo_bench.judging.judgement import FAULTS
 from apo_bench.records import CODES, Thresholds
 from tests import scenes
 from tests.end_states import (
-    CARRIED,
     CASTLES,
     CLEARANCE_MM,
     END,
     FIXTURE,
     LAYOUT,
-    POCKETS,
     TOWER,
     Edit,
     never,
@@ -55,12 +52,9 @@ class Case(NamedTuple):
 RIGHT = [
     Case("tower, exactly", TOWER, []),
     Case("fixture, exactly, the fixture is away at the end", FIXTURE, []),
-    Case("tower, the thin stick lies on the floor of the hole", TOWER, [shift("stick", 3, 0, 0, -0.25)]),
-    Case("tower, the stick leans on a wall", TOWER, [shift("stick", 3, 0, 0.25, -0.25)]),
     Case("tower, the stick lies skew between its walls", TOWER, [shift("stick", 3, 0, 0, 0, (0, 0, 0.4))]),
     Case("tower, castle 2 overhangs by 29 of 60 mm", TOWER, [shift("castle2", 2, 29, 0, 0)]),
     Case("tower, castle 2 is 0.3 mm aside", TOWER, [shift("castle2", 2, 0, 0.3, 0)]),
-    Case("tower, castle 2 floats by 0.09 mm", TOWER, [shift("castle2", 2, 0, 0, -0.09), shift("stick", 3, 0, 0, 0.05)]),
     Case("tower, geoms 0.04 mm deep", TOWER, [state(END, penetration_m=0.04e-3)]),
     Case("tower, pushed by 0.9 mm at the insertion", TOWER, [shift(p, 3, 0.9, 0, 0) for p in ("castle1", "castle2")]),
     Case(
@@ -78,19 +72,11 @@ RIGHT = [
 
 NEARLY = [
     Case("tower, the stick is 0.45 mm inside a wall", TOWER, [shift("stick", 3, 0, 0.45, 0)], "gap"),
-    Case("tower, castle 2 is 3 mm aside and the stick forced in", TOWER, [shift("castle2", 2, 0, 3, 0)], "gap"),
-    Case("tower, castle 2 tilted by 1 degree", TOWER, [shift("castle2", 2, 0, 0, 0, (1, 0, 0))], "gap"),
     Case("tower, castle 2 floats by 0.15 mm", TOWER, [shift("castle2", 2, 0, 0, -0.15)], "gap"),
     Case(
         "fixture, castle 2 stands 1 mm off the fixture",
         FIXTURE,
         [shift("castle2", 3, 0, -1, 0), shift("castle2", 5, 0, 1, 0)],
-        "gap",
-    ),
-    Case(
-        "pockets, the cubes hang 2.5 mm above the floor",
-        POCKETS,
-        [shift(p, 6, 0, 0, 2.5) for p in ("cube2", "cube3", "stick")],
         "gap",
     ),
     Case("tower, geoms 0.06 mm deep", TOWER, [state(END, penetration_m=0.06e-3)], "penetration"),
@@ -105,14 +91,6 @@ NEARLY = [
         "tower, pushed 1.1 mm by the next part, pushed back by the last",
         TOWER,
         [shift("castle1", 2, 1.1, 0, 0, until=3)],
-        "pushed",
-    ),
-    Case("castles, lifted 1.1 mm and let down again", CASTLES, [shift("castle1", 2, 0, 0, 1.1, until=3)], "pushed"),
-    Case("castles, the stick slides 1.5 mm when it is let go", CASTLES, [shift("stick", END, 1.5, 0, 0)], "pushed"),
-    Case(
-        "carried stick, the cube slips 1.2 mm before it is moved",
-        CARRIED,
-        [shift("cube", 4, 1.2, 0, 0, until=5)],
         "pushed",
     ),
     Case("tower, the stick is still held", TOWER, [state(END, released=False)], "not_released"),
@@ -134,38 +112,16 @@ WRONG = [
         ],
         "overlap",
     ),
-    Case(
-        "castles of one kind stand in each other's place",
-        CASTLES,
-        [put("castle1", 1, scenes.mm(70, 0, 0)), put("castle2", 2, scenes.mm(-70, 0, 0))],
-        "overlap",
-    ),
     Case("tower, castle 2 is 6 mm aside", TOWER, [shift("castle2", 2, 0, 6, 0)], "gap"),
-    Case("tower, castle 2 tilted by 6 degrees", TOWER, [shift("castle2", 2, 0, 0, 0, (6, 0, 0))], "gap"),
     Case("tower, castle 2 was not turned over", TOWER, [put("castle2", 2, scenes.mm(0, 0, 40))], "gap"),
     Case("tower, castle 2 overhangs by 31 of 60 mm", TOWER, [shift("castle2", 2, 31, 0, 0)], "overlap"),
-    Case(
-        "castles, a careless castle 2: the stick lies on its merlon",
-        CASTLES,
-        [shift("castle2", 2, 0, 3, 0), shift("stick", 3, 0, 0, 5, (0, -4.1, 0))],
-        "gap",
-    ),
     Case(
         "castles, the stick turned end for end: other faces touch",
         CASTLES,
         [shift("stick", 3, 0, 0, 0, (0, 0, 180))],
         "gap",
     ),
-    Case("tower, castle 2 was lifted off when it was over", TOWER, [shift("castle2", 3, 0, 0, -20)], "gap"),
-    Case("carried stick, the stick stayed behind", CARRIED, [put("stick", 5, scenes.mm(-70, 0, 65))], "gap"),
-    Case(
-        "fixture, castle 2 far from the fixture when it was put",
-        FIXTURE,
-        [shift("castle2", 3, 0, -8, 0), shift("castle2", 5, 0, 8, 0)],
-        "gap",
-    ),
     Case("tower, the stick was never inserted", TOWER, [never(3, END)], "not_made"),
-    Case("tower, the second operation was not finished", TOWER, [never(2)], "not_made"),
     Case("tower, nothing was done", TOWER, [never(1, 2, 3, END)], "not_made"),
 ]
 """A person would say: no."""
@@ -175,13 +131,9 @@ FLIPPED = {
     "fixture, castle 2 stands 1 mm off the fixture": "the fixture is put away, and it shows nowhere",
     "tower, deep geoms on the way, not at the end": "it was on the way",
     "tower, pushed 1.1 mm by the next part, pushed back by the last": "all ends where it was put",
-    "castles, lifted 1.1 mm and let down again": "it ends where it was put",
-    "carried stick, the cube slips 1.2 mm before it is moved": "it is moved again",
     "tower, castle 2 was still held when it was over": "it was on the way",
     "everything is assembled well, but at the other end of the table": "it is right in itself",
     "tower, pushed by 1.1 mm at the insertion": "all of it moved as one, and may stand anywhere on the table",
-    "fixture, castle 2 far from the fixture when it was put": "the stick was put when it stood where it should",
-    "castles of one kind stand in each other's place": "the stick lies in both slots, as it should",
     "castles, the stick turned end for end: other faces touch": "it is the same stick, turned by half a turn",
 }
 """States that are a success and not as demonstrated, each with what a person says who sees the finished assembly."""
@@ -304,15 +256,6 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
     assert numbers[0] == pytest.approx(numbers[1], abs=1e-6)
 
 
-def test_the_reference_only_says_how_large_an_overlap_should_be() -> None:
-    """A true overlap of 30 mm: 20 of them are enough, though they are a third of the face."""
-    scene = TOWER()
-    goals = scene.goals.copy()
-    goals[1] = goals[1] @ scenes.mm(30, 0, 0)
-    assert not verdict(scene, [shift("castle2", 2, 40, 0, 0)]).success
-    assert verdict(replace(scene, goals=goals), [shift("castle2", 2, 10, 0, 0)]).success
-
-
 def test_a_tower_that_is_turned_after_it_was_built_is_right_but_not_as_demonstrated() -> None:
     """Its parts touch as they did; its centres stay where they are, its corners do not."""
     about = scenes.mm(0, 0, 0, (0, 0, 5))
@@ -342,15 +285,6 @@ def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:
     assert verdict(FIXTURE(), far).success
     for fields in ({"speed_m_s": 0.01}, {"released": False}, {"penetration_m": 1e-3}):
         assert not verdict(FIXTURE(), [*far, state(END, **fields)]).success
-
-
-def test_a_part_that_keeps_a_contact_is_no_fixture() -> None:
-    assert {name: fixtures(build().assembly) for name, build in scenes.ALL.items()} == {
-        **dict.fromkeys(scenes.ALL, frozenset()),
-        "fixture": {"cube"},
-        "fixture_alignment": {"B"},
-        "pockets": {"cube1"},
-    }
 
 
 def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:

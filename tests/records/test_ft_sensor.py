@@ -23,19 +23,7 @@ def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, 
     assert ft_noise(given) == noise == ft_noise(spelled)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (
-            "cobott",
-            "unknown wrench sensor 'cobott'; did you mean 'joint-torque'? Known: cobot, external, external-coarse, ide",
-        ),
-        ("-1", "the wrench sensor '-1' was given; standard deviations from 0 to 10 N and from 0 to 5 Nm are allowed"),
-        ("0.1/nan", "the wrench sensor '0.1/nan' was given;"),
-    ],
-)
-def test_what_is_no_wrench_sensor_is_one_sentence(given: str, said: str) -> None:
-    with pytest.raises(InputError) as refused:
+@pytest.mark.parametrize("given", ["writs", "-1", "0.1/nan", "11"])
+def test_another_sensor_is_refused(given: str) -> None:
+    with pytest.raises(InputError, match="force-torque sensor '"):
         checked_ft_sensor(given)
-    assert str(refused.value).startswith(said)
-    assert "\n" not in str(refused.value)

@@ -32,7 +32,7 @@ def test_numbers_are_those_of_their_kinds() -> None:
     ("given", "said"),
     [
         ("elbow:1", "unknown kind of robot error 'elbow'. Known: hand_eye, in_hand, joints, none, tool."),
-        ("tool:1+tool:2", "the robot error 'tool:1+tool:2' was given, which has tool twice; say it once."),
+        ("tool:1+tool:2", "the robot error 'tool:1+tool:2' was given, which has tool twice; state it once."),
         (
             "tool:1/2",
             "the robot error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5.",
@@ -63,14 +63,7 @@ def test_what_a_robot_is_told_is_what_is_drawn_nothing_or_something_else(
     assert assumed_error(spelled, "tool:0.2") == told
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ("drwan", "unknown stated error 'drwan'; did you mean 'matched'?"),
-        ("tool:1+elbow:2", "unknown stated error 'tool:1+elbow:2'"),
-    ],
-)
-def test_what_is_no_stated_error_is_one_sentence(given: str, said: str) -> None:
-    with pytest.raises(InputError) as refused:
+@pytest.mark.parametrize("given", ["matchd", "tool:1+elbow:2"])
+def test_another_assumed_error_is_refused(given: str) -> None:
+    with pytest.raises(InputError, match="assumed robot error"):
         checked_assumed_robot_error(given)
-    assert str(refused.value).startswith(said)

@@ -198,12 +198,10 @@ def test_the_report_says_which_salt_and_how_to_run_a_trial_again(tmp_path: Path)
 
 
 def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["replay", "block_on_block", "--secret-seed-file", str(tmp_path / "secret_seed")]) == 2
+    assert cli.main(["run", "block_on_block", "--secret-seed-file", str(tmp_path / "secret_seed")]) == 2
     assert "the salt file cannot be read (No such file or directory); check the path" in capsys.readouterr().err
     assert not (tmp_path / "secret_seed").exists()
-    assert (
-        cli.main(["replay", "block_on_block", "--observation", "seen.json", "--secret-seed-file", "secret_seed"]) == 2
-    )
+    assert cli.main(["run", "block_on_block", "--observation", "seen.json", "--secret-seed-file", "secret_seed"]) == 2
     assert "--secret-seed-file was given together with --observation, which draws nothing" in capsys.readouterr().err
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import draw_layout, load_scenario
 from apo_bench.scenario import scenario_names
-from apo_bench.scenario.layouts import draw_layouts
+from apo_bench.scenario.layout import draw_layouts
 
 
 @pytest.mark.parametrize("name", scenario_names())

@@ -6,9 +6,9 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.simulation.robot.paths import shifted, smooth, steady
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.world import place, sleeping
+from apo_bench.simulation.robot.paths import smooth_trajectory, steady_trajectory, translate
+from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
+from apo_bench.simulation.scene.world import allow_sleep, set_part_pose
 
 DOWN = np.array([0.0, 0.0, -1.0])
 NORTH = np.array([0.0, 1.0, 0.0])
@@ -23,7 +23,7 @@ def hand_at(scene: Scene, x: float, y: float, z: float) -> Robot:
     T = pose.at((0.0, 0.0, 0.0)) @ robot.T
     T[:3, 3] = x, y, 0.2
     robot.go(T, 0.8)
-    robot.follow(smooth(robot.T, shifted(robot.T, DOWN, 0.2 - z), 0.3))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, DOWN, 0.2 - z), 0.3))
     robot.stand()
     return robot
 
@@ -44,33 +44,33 @@ def push_on_table(scene: Scene, robot: Robot) -> float:
 def test_an_empty_hand_that_presses_on_the_table_is_stopped(arm: str, asleep: bool) -> None:
     """By its base, which cannot move either, the arm felt nothing of the table, and pressed with 320 N."""
     scene = build_scene(load_scenario("stick_in_tower"), arm=arm)
-    with sleeping(scene.work, asleep):
+    with allow_sleep(scene.work, asleep):
         robot = hand_at(scene, 0.1, 0.16, 0.02)
-        with pytest.raises(Halt) as halt:
-            robot.follow(steady(robot.T, shifted(robot.T, DOWN, 0.025), 0.004))
-        assert (halt.value.code, halt.value.part) == ("collision", "table")
+        with pytest.raises(ExecutionAborted) as aborted:
+            robot.follow(steady_trajectory(robot.T, translate(robot.T, DOWN, 0.025), 0.004))
+        assert (aborted.value.code, aborted.value.part) == ("collision", "table")
         assert 20.0 < push_on_table(scene, robot) < HARDEST_N
 
 
 def test_an_empty_hand_that_presses_on_the_wall_of_a_pocket_is_stopped() -> None:
     scene = build_scene(load_scenario("pocket_table"))
-    with sleeping(scene.work, True):
+    with allow_sleep(scene.work, True):
         robot = hand_at(scene, -0.06, 0.15, 0.02)
-        robot.follow(smooth(robot.T, shifted(robot.T, DOWN, 0.014), 0.05))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, DOWN, 0.014), 0.05))
         assert push_on_table(scene, robot) == 0.0
-        with pytest.raises(Halt) as halt:
-            robot.follow(steady(robot.T, shifted(robot.T, NORTH, 0.02), 0.004))
-        assert (halt.value.code, halt.value.part) == ("collision", "table")
+        with pytest.raises(ExecutionAborted) as aborted:
+            robot.follow(steady_trajectory(robot.T, translate(robot.T, NORTH, 0.02), 0.004))
+        assert (aborted.value.code, aborted.value.part) == ("collision", "table")
         assert 20.0 < push_on_table(scene, robot) < HARDEST_N
 
 
 def test_a_part_that_fell_asleep_is_felt_no_longer(tower: Scene) -> None:
     """The hand lifts off between two looks, the part comes to rest, and its sensor must not keep what it felt last."""
     robot = Robot(tower, tower.scenario.start)
-    with sleeping(tower.work, True):
+    with allow_sleep(tower.work, True):
         robot.wait(0.1)
         sensors = robot.data.sensordata.reshape(-1, 3)[len(tower.work.free) :]
         sensors[:] = 1.0
-        place(tower.work, robot.data, "castle1", tower.scenario.start["castle1"])
+        set_part_pose(tower.work, robot.data, "castle1", tower.scenario.start["castle1"])
         robot.wait(0.1)
         assert robot.forces.load() == 0.0

@@ -97,7 +97,7 @@ def test_a_part_that_is_not_where_it_should_be_is_a_lost_grasp(tower: Scene) -> 
 
 def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) -> None:
     """Velocity feed-forward: without it the tip lags by millimetres and yaws by half a degree."""
-    from apo_bench.simulation.robot.paths import shifted, smooth
+    from apo_bench.simulation.robot.paths import smooth_trajectory, translate
 
     worst = np.zeros(2)
 
@@ -108,7 +108,7 @@ def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) ->
         worst[:] = np.maximum(worst, [across * 1e3, turn])
 
     robot = Robot(tower, layout(tower, 2).start, watch)
-    robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.2), 0.2))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), 0.2), 0.2))
     assert worst[0] < 0.3
     assert worst[1] < 0.05
 

@@ -7,16 +7,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
+from apo_bench import Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
+from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
-from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted
+from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, translate
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import ForceSensors
-from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
+from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -50,7 +51,7 @@ ASKED = [("paper-track", 1.0), ("uncorrected", 1.0), ("paper", 1.0), ("paper", 0
 
 @pytest.mark.parametrize(
     ("fidelity", "grasp", "asked"),
-    [("contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
+    [("near-contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
 )
 def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
     cache = ReplayCache()
@@ -62,9 +63,9 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     cache = ReplayCache()
     plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.poses)
-    first = replay(plan, scene(), fidelity="near-contact", cache=cache)
+    first = replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), fidelity="near-contact", cache=cache) is first
+    assert replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():
@@ -76,7 +77,7 @@ def test_marks_differ_where_anything_that_led_there_differs():
     a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
     assert a[:-1] == b[:-1]
     assert a[-1] != b[-1]
-    assert not set(a) & set(cache_keys(scene(), layout.start, "contact", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", moves(plan, scene())))
     elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
     assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
 
@@ -132,7 +133,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
 def test_contact_simulates_less_and_passes_as_much_time():
     layout = shown().layout
     plan = Plan(scene().scenario.assembly, layout.start, layout.poses)
-    full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "contact"))
+    full, contact = (replay(plan, scene(), config=ExecutionConfig(fidelity)) for fidelity in ("full", "near-contact"))
     assert full.outcome.code == contact.outcome.code == "ok"
     assert contact.sim_time_s == pytest.approx(full.sim_time_s, abs=0.5)
     for part, T in full.reached.final.poses.items():
@@ -175,7 +176,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
     left_out = 0
     for _ in range(60):
         start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
-        end = shifted(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
+        end = translate(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
         line = Trajectory(start, end, 0.2, np.asarray)
         s = np.linspace(0.0, 1.0, 201)
         spans = obstacles.near_spans(its, data, hand, ("stick",), line, s)
@@ -202,7 +203,7 @@ def test_nothing_is_left_out_while_something_moves():
     its = scene()
     data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
-    line = Trajectory(shifted(stick, (0, 0, 1), 0.2), shifted(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
+    line = Trajectory(translate(stick, (0, 0, 1), 0.2), translate(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
     s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
     hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
     assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == []
@@ -214,28 +215,11 @@ def test_nothing_is_left_out_while_something_moves():
 def test_sleep_ends_with_the_replay():
     options = scene().work.model.opt
     before = int(options.enableflags)
-    with sleeping(scene().work, True):
+    with allow_sleep(scene().work, True):
         assert options.enableflags & SLEEP
     assert options.enableflags == before
-    with pytest.raises(IndexError), sleeping(scene().work, True):
+    with pytest.raises(IndexError), allow_sleep(scene().work, True):
         [][0]
     assert options.enableflags == before
-    row("oracle", "contact")
+    row("oracle", "near-contact")
     assert options.enableflags == before
-
-
-def test_contact_is_refused_for_the_ideal_gripper():
-    with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
-        TrialConfig("stick_in_tower", grasp="weld", fidelity="near-contact")
-
-
-def test_a_stick_that_rocked_for_ever_comes_to_rest():
-    spec = TrialConfig("stick_in_tower", 4.0, 4.0, 1.0, method="contact", seed=1)
-    assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
-
-
-def test_steps_of_another_length_are_for_a_while():
-    model = scene().work.model
-    with pytest.raises(IndexError), timestep(model, 0.0005):
-        [][round(model.opt.timestep / 0.0005) - 1]
-    assert model.opt.timestep == 0.001

@@ -3,21 +3,22 @@
 import numpy as np
 
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.film.caption import ABOVE_PX, BELOW_PX, Caption, add_caption
-from apo_bench.simulation.film.film import frames, operation_words, sampled
-from apo_bench.simulation.film.track import Chapter, FilmMoment, FilmTrack
-from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Doing
+from apo_bench.simulation.film.film import frames, operation_words, sample_moments
+from apo_bench.simulation.film.track import FilmMoment, FilmTrack, Segment
+from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Phase
 
 
 def moments(*forces: float) -> list[FilmMoment]:
     """Moments of operations 1, 1, .., 2, 20 ms apart."""
     operations = [0] * (len(forces) - 1) + [1]
     pairs = zip(operations, forces, strict=True)
-    return [FilmMoment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(pairs)]
+    return [FilmMoment(0.02 * i, np.zeros(1), Phase(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(pairs)]
 
 
 def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
-    samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sampled(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
+    samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sample_moments(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
     assert samples == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
 
 
@@ -28,23 +29,23 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     track = FilmTrack()
     hands = FilmTrack()
     plan = Plan(assembly, layout.start, layout.poses)
-    assert replay(plan, scene, track.hooks, fidelity="near-contact").outcome.code == "ok"
+    assert replay(plan, scene, track.hooks, config=ExecutionConfig("near-contact")).outcome.code == "ok"
     assert track.plan is plan
-    order = list(dict.fromkeys((m.doing.operation, m.doing.macro) for m in track.moments if m.doing.operation == 1))
+    order = list(dict.fromkeys((m.phase.operation, m.phase.macro) for m in track.moments if m.phase.operation == 1))
     assert order == [(1, stage) for stage in ("pick", "lift", "carry", "move-to-contact", "release", "depart")]
-    landed = [m.doing for m in track.moments if m.doing.macro == "move-to-contact"]
-    assert max(doing.force_n for doing in landed) > 1.0
+    landed = [m.phase for m in track.moments if m.phase.macro == "move-to-contact"]
+    assert max(phase.force_n for phase in landed) > 1.0
     assert operation_words(assembly, track.moments[-1]).startswith("operation 2 of 2")
     first = track.moments[0]
     assert operation_words(assembly, first) == "at the start"
-    touching = first._replace(doing=Doing(None, TOUCHING, 0.0))
+    touching = first._replace(phase=Phase(None, TOUCHING, 0.0))
     assert operation_words(assembly, touching) == "the closed hand touches what is fixed"
 
     demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands.hooks)
-    assert {m.doing for m in hands.moments} == {Doing(k, BY_HAND, 0.0) for k in (None, 0, 1)}
+    assert {m.phase for m in hands.moments} == {Phase(k, BY_HAND, 0.0) for k in (None, 0, 1)}
     end = np.array(hands.moments[-1].qpos)
-    chapter = Chapter("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)
-    drawn = [picture for picture, _ in frames(assembly, layout.start, [chapter])]
+    segment = Segment("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)
+    drawn = [picture for picture, _ in frames(assembly, layout.start, [segment])]
     assert drawn[0].shape == drawn[-1].shape
     assert np.abs(drawn[0].astype(int) - drawn[1]).max() > 50
     assert np.array_equal(end, hands.moments[-1].qpos)

@@ -9,7 +9,8 @@ import pytest
 from apo_bench import Layout, Plan, Scene, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
+from apo_bench.simulation.execution import ExecutionConfig
+from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
 
 
 class Calls:
@@ -33,9 +34,9 @@ class Calls:
         """What was called; ticks of one operation count once."""
         return [call for call, _ in groupby(self.made)]
 
-    def _tick(self, data: Any, doing: Doing) -> None:
-        self.made.append(("tick", doing.operation))
-        self.macros.add(doing.macro)
+    def _tick(self, data: Any, phase: Phase) -> None:
+        self.made.append(("tick", phase.operation))
+        self.macros.add(phase.macro)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +60,7 @@ BOTH_STEPS = [
 def test_a_replay_calls_its_hooks_before_and_after_each_step_and_each_tick(scene: Scene, layout: Layout) -> None:
     calls = Calls()
     plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
-    assert replay(plan, scene, calls.hooks, fidelity="near-contact").outcome.code == "ok"
+    assert replay(plan, scene, calls.hooks, config=ExecutionConfig("near-contact")).outcome.code == "ok"
     assert calls.order == [("replay", plan), *BOTH_STEPS]
 
 
@@ -76,7 +77,7 @@ def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
     plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
     first = scene.scenario.assembly.operations[0].main
     aside = {**layout.start, first: pose.at((0.0, 0.04, 0.0)) @ layout.start[first]}
-    assert replay(plan, scene, calls.hooks, parts_at=aside, fidelity="near-contact").outcome.code != "ok"
+    assert replay(plan, scene, calls.hooks, parts_at=aside, config=ExecutionConfig("near-contact")).outcome.code != "ok"
     assert calls.order == [("replay", plan), ("tick", None), ("before", Step(0)), ("tick", 0)]
 
 
@@ -84,7 +85,7 @@ def test_of_a_plan_that_is_refused_the_plan_is_said_and_no_step(scene: Scene, la
     calls = Calls()
     far = np.array([pose.at((3.0, 0.0, 0.0)) @ T for T in layout.poses])
     plan = Plan(scene.scenario.assembly, layout.start, far)
-    assert replay(plan, scene, calls.hooks, fidelity="near-contact").outcome.stage == "plan"
+    assert replay(plan, scene, calls.hooks, config=ExecutionConfig("near-contact")).outcome.stage == "plan"
     assert calls.order == [("replay", plan), ("tick", None)]
 
 
@@ -94,9 +95,9 @@ def test_a_function_of_the_state_is_a_hook_too() -> None:
     def look(data: Any) -> None:
         seen.append(data)
 
-    hooks = hooks_of(look)
+    hooks = as_hooks(look)
     assert hooks.after_tick is not None
-    hooks.after_tick("state", Doing(0, "pick", 1.0))
+    hooks.after_tick("state", Phase(0, "pick", 1.0))
     assert seen == ["state"]
-    assert hooks_of(hooks) is hooks
-    assert hooks_of(None).after_tick is None
+    assert as_hooks(hooks) is hooks
+    assert as_hooks(None).after_tick is None

@@ -9,6 +9,7 @@ from apo_bench import Plan, Scenario, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.scenario.attach_lines import nominal_operations
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.trial.stages import Attempt, replay_and_judge
 
 CUBE = (Path(__file__).parents[2] / "assets" / "parts" / "cube.xml").read_text(encoding="utf-8")
@@ -41,7 +42,7 @@ def done(
     layout = draw_layout(scenario, np.random.default_rng(1), scene.clearance_mm)
     goals = layout.poses @ pose.at(1e-3 * np.array(off_mm))
     plan = Plan(scenario.assembly, layout.start, goals, schedule)
-    return replay_and_judge(plan, scene, layout.poses, fidelity="near-contact")
+    return replay_and_judge(plan, scene, layout.poses, config=ExecutionConfig("near-contact"))
 
 
 def names(scenario: Scenario) -> list[list[str]]:

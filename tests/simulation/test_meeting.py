@@ -7,10 +7,10 @@ from scipy.spatial import ConvexHull
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Hull, pose
-from apo_bench.simulation.scene.geoms import Bits, is_lining, meetings, widest_disc
-from apo_bench.simulation.scene.hulls import joined_across, volume, within
+from apo_bench.simulation.scene.contact_bits import Bits, is_lining, meetings, widest_disc
+from apo_bench.simulation.scene.hulls import clip_hull, join_convex, volume
 from apo_bench.simulation.scene.walls import COARSE_M, linings, simulated_pieces
-from apo_bench.simulation.scene.world import World, initial_state, place
+from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
 
 CLEARANCE_M = 0.25e-3
 ROUND = ("nested_bushings", "l_bracket_on_plate")
@@ -64,7 +64,7 @@ def test_a_plate_lies_on_another_by_what_is_behind_their_walls(scene: Scene) -> 
     data = initial_state(world, scene.scenario.start)
     base = pose.at((0.1, 0.2, 0.0))
     world.model.body_pos[world.body["base"]] = base[:3, 3]
-    place(world, data, "plate", base @ pose.at((0.0, 0.0, 0.02 - 1e-5), (0.0, 0.0, 30.0)))
+    set_part_pose(world, data, "plate", base @ pose.at((0.0, 0.0, 0.02 - 1e-5), (0.0, 0.0, 30.0)))
     mujoco.mj_forward(world.model, data)
     names = ["/".join(world.model.geom(g).name.split("/")[1:]) for pair in data.contact.geom for g in pair]
     solid = scene.scenario.assembly.solids["plate"]
@@ -75,8 +75,8 @@ def test_a_plate_lies_on_another_by_what_is_behind_their_walls(scene: Scene) -> 
 def play(world: World, data: mujoco.MjData, angle: float, off_m: float) -> int:
     """At how many points a peg in the middle of a plate touches it that is so far off the axis."""
     plate = pose.at((0.3, 0.2, 0.3))
-    place(world, data, "plate", plate)
-    place(world, data, "peg", plate @ pose.at((off_m * np.cos(angle), off_m * np.sin(angle), -0.03)))
+    set_part_pose(world, data, "plate", plate)
+    set_part_pose(world, data, "peg", plate @ pose.at((off_m * np.cos(angle), off_m * np.sin(angle), -0.03)))
     mujoco.mj_kinematics(world.model, data)
     mujoco.mj_comPos(world.model, data)
     mujoco.mj_collision(world.model, data)
@@ -95,8 +95,8 @@ def test_a_peg_has_its_play_in_every_direction(scene: Scene) -> None:
 def test_a_box_that_was_cut_is_put_together_again() -> None:
     box = Hull("box", np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]))
     cut = np.array([0.6, 0.8, 0.0, 0.7])
-    halves = [within(box, cut), within(box, -cut)]
-    quarters = [within(half, by * np.array([0.0, 0.0, 1.0, 0.5])) for half in halves for by in (1.0, -1.0)]
-    (whole,) = joined_across(quarters)
+    halves = [clip_hull(box, cut), clip_hull(box, -cut)]
+    quarters = [clip_hull(half, by * np.array([0.0, 0.0, 1.0, 0.5])) for half in halves for by in (1.0, -1.0)]
+    (whole,) = join_convex(quarters)
     assert volume(whole) == pytest.approx(1.0)
-    assert len(joined_across([quarters[0], quarters[3]])) == 2
+    assert len(join_convex([quarters[0], quarters[3]])) == 2

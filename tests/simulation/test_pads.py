@@ -1,10 +1,10 @@
-"""Grooves of fingertips are filled, and a weak hand comes slowly to the first of several mouths."""
+"""Grooves of fingertips are filled, and a weak hand comes slowly to the first of several entrances."""
 
 import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.simulation.arms.measuring import fill_grooves
+from apo_bench.simulation.arms.grooves import fill_grooves
 
 BOX = '<geom type="box" pos="{} 0.002 {}" size="0.003 0.002 0.003"/>'
 FINGER = '<mujoco><worldbody><body><joint name="{}" type="slide"/>{}</body></worldbody></mujoco>'

@@ -9,16 +9,17 @@ import pytest
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import ft_noise
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.probing.feeling import ProbingState, touch_guard
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
-from apo_bench.simulation.execution.probing.touching import _stand_off, find_out
+from apo_bench.simulation.execution.probing.state import ProbingState, touch_guard
+from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
+from apo_bench.simulation.robot.wrist import filtered_noise, low_pass_part
+from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
-from apo_bench.trial.trial import probing_config
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 
@@ -43,19 +44,19 @@ def drawn(name, kinds, seed=3):
 def found_out(name, error, parts_at=None, stated=STATED):
     """What a robot believes once it has touched what is fixed."""
     start = plan(name).start if parts_at is None else parts_at
-    robot = Robot(scene(name), start, None, "contact", error)
-    feeling = ProbingState(
+    robot = Robot(scene(name), start, None, "near-contact", error)
+    probing = ProbingState(
         probing_config(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error
     )
     robot.wait(0.05)
-    find_out(robot, feeling)
-    return feeling.belief
+    probe_fixed_parts(robot, probing)
+    return probing.estimate
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "peg_in_hole", "pocket_table"])
 def test_the_floor_is_touched_at_three_places_around_the_goals(name):
     places = floor_places(plan(name), scene(name))
-    middle = plan(name).goals[:, :2, 3].mean(axis=0)
+    middle = plan(name).target_poses[:, :2, 3].mean(axis=0)
     angles = [np.arctan2(*(place.T_world_tip[:2, 3] - middle)[::-1]) for place in places]
     assert len(places) == 3
     # every third of a turn, so the middle is inside
@@ -67,7 +68,7 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
 
 def test_a_robot_that_may_be_far_off_begins_farther_away():
     def begins(stated):
-        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "contact")
+        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "near-contact")
         probing = probing_config(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
         stand_off = partial(_stand_off, robot, ProbingState(probing, plan("peg_in_hole"), scene("peg_in_hole"), None))
         found = (places(plan("peg_in_hole"), scene("peg_in_hole"), stand_off) for places in (floor_places, wall_places))
@@ -82,16 +83,18 @@ def test_a_robot_that_may_be_far_off_begins_farther_away():
 
 def test_a_robot_that_is_as_far_off_as_it_was_told_feels_the_floor():
     error = drawn("stick_in_tower", "tool:5")
-    belief = found_out("stick_in_tower", error, stated="tool:5")
-    assert len(belief.touches) == 3
-    assert belief.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
+    estimate = found_out("stick_in_tower", error, stated="tool:5")
+    assert len(estimate.touches) == 3
+    assert estimate.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
 
 
 def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
     name = "stick_in_tower"
     error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
     probing = probing_config(plan(name), scene(name), "tool:1.2", (5,), "ideal")
-    outcome = replay(plan(name), scene(name), fidelity="near-contact", error=error, probing=probing).outcome
+    outcome = replay(
+        plan(name), scene(name), config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+    ).outcome
     assert (outcome.stage, outcome.code, outcome.operation) == ("touch", "collision", None)
     assert outcome.sentence == (
         "the arm struck table while it touched what is fixed, before the first operation: it began 4.0 mm before what "
@@ -100,7 +103,7 @@ def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_a
 
 
 def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
-    felt = felt_noise(ft_noise("10/5"), low_pass_part())
+    felt = filtered_noise(ft_noise("10/5"), low_pass_part())
     assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 
@@ -127,7 +130,10 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
     probing = probing_config(plan(name), scene(name), "in_hand:0.5/1", (6,))
     felt = replay_and_judge(
-        plan(name), scene(name), plan(name).goals, fidelity="near-contact", error=error, probing=probing
+        plan(name),
+        scene(name),
+        plan(name).target_poses,
+        config=ExecutionConfig("near-contact", robot_error=error, probing=probing),
     )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
@@ -136,22 +142,22 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
 def test_a_robot_that_does_not_feel_does_nothing_besides():
     for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True):
         assert not move.transfer.squaring
-        assert move.transfer.flush is None
-        assert not move.transfer.beside
+        assert move.transfer.flat is None
+        assert not move.transfer.side_touches
         assert not move.transfer.in_last
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():
     """Walls on all sides: what is left of hand, eye and tool at the goals is a tenth of what was drawn."""
     error = drawn("peg_in_hole", STATED)
-    belief = found_out("peg_in_hole", error)
-    assert not belief.refused
+    estimate = found_out("peg_in_hole", error)
+    assert not estimate.refused
     tip = pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
-    tip[:3, 3] = belief.middle
+    tip[:3, 3] = estimate.middle
     real = error.hand_eye @ tip @ error.tool
-    off = pose.log(pose.inverse(real) @ belief.real(tip))[:3]
+    off = pose.log(pose.inverse(real) @ estimate.real(tip))[:3]
     assert np.linalg.norm(off) < 0.1 * np.linalg.norm((real - tip)[:3, 3])
-    deviations = np.sqrt(np.diag(belief.covariance_of(tip)))[:3]
+    deviations = np.sqrt(np.diag(estimate.covariance_of(tip)))[:3]
     assert (np.abs(off) < 4.0 * deviations).all()
 
 
@@ -172,10 +178,12 @@ def test_the_robot_knows_nothing_but_what_it_touches():
 def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
     name = "stick_in_tower"
     error = drawn(name, "hand_eye:0.5/0.1+in_hand:0.3/1", 4)
-    goals = plan(name).goals
-    blind = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error)
+    goals = plan(name).target_poses
+    blind = replay_and_judge(plan(name), scene(name), goals, config=ExecutionConfig("near-contact", robot_error=error))
     probing = probing_config(plan(name), scene(name), "hand_eye:0.5/0.1+in_hand:0.3/1", (6,))
-    felt = replay_and_judge(plan(name), scene(name), goals, fidelity="near-contact", error=error, probing=probing)
+    felt = replay_and_judge(
+        plan(name), scene(name), goals, config=ExecutionConfig("near-contact", robot_error=error, probing=probing)
+    )
     assert not blind.verdict.success
     assert felt.verdict.success
     assert felt.result.felt.touches == 7

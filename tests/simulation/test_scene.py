@@ -9,7 +9,7 @@ from apo_bench.geometry import pose
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.scene.scene import scene_xml
-from apo_bench.simulation.scene.world import initial_state, place, snapshot
+from apo_bench.simulation.scene.world import initial_state, set_part_pose, snapshot
 
 
 def half(scene: Scene, geom: str) -> list[float]:
@@ -57,7 +57,7 @@ def test_contacts_of_parts_and_pads_have_the_checked_stiffness(tower: Scene) -> 
 def test_a_snapshot_sees_what_is_inside_what(tower: Scene) -> None:
     start = draw_layout(tower.scenario, np.random.default_rng(0)).start
     data = initial_state(tower.shown, start)
-    place(tower.shown, data, "stick", start["stick"] @ pose.at((0, 0, -0.0004)))
+    set_part_pose(tower.shown, data, "stick", start["stick"] @ pose.at((0, 0, -0.0004)))
     assert snapshot(tower.shown, data, start).penetration_m == pytest.approx(0.0004, abs=1e-6)
 
 

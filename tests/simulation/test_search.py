@@ -9,13 +9,14 @@ import pytest
 
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import pose
-from apo_bench.simulation.execution import search
+from apo_bench.simulation.execution import ExecutionConfig, search
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.execution.search import PITCH_M, RADIUS_M, Spiral, press_in
+from apo_bench.simulation.execution.search import RADIUS_M, press_in
+from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot.paths import shifted, steady
-from apo_bench.simulation.robot.wrist import Guard
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.paths import steady_trajectory, translate
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
@@ -39,13 +40,15 @@ def layout(name):
 def aside(name, mm):
     """The true plan, but for its last operation, which is this far off across the walls of its fit."""
     truth = layout(name)
-    goals = np.array(layout(name).goals)
+    goals = np.array(layout(name).poses)
     goals[-1, :3, 3] += 1e-3 * mm * goals[-1, :3, 1]
     return Plan(scene(name).scenario.assembly, truth.start, goals)
 
 
 def carried_out(plan, name, spiral, cache=None):
-    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", cache, spiral)
+    return replay_and_judge(
+        plan, scene(name), layout(name).poses, config=ExecutionConfig("near-contact", spiral), cache=cache
+    )
 
 
 def driven(law, push):
@@ -101,7 +104,7 @@ def test_shared_beginnings_change_no_byte():
     none, search = (json.loads(each) for each in alone)
     assert (none["failure_code"], none["config_hash"]) == ("force_stop", search["config_hash"])
     assert search["sim_time_s"] > none["sim_time_s"]
-    assert none["predicted"] == search["predicted"]
+    assert none["failure_prediction"] == search["failure_prediction"]
 
 
 def test_holes_are_felt_for_where_parts_are_inserted():
@@ -158,9 +161,9 @@ def test_two_searches_in_one_motion_bring_every_pose_to_where_the_second_ended(m
     monkeypatch.setattr(search, "search_hole", lambda *_: next(steps))
     monkeypatch.setattr(search, "_ease_in", lambda *_: np.zeros(3))
     end = pose.at((0.0, 0.0, 0.1))
-    stopped = shifted(end, DOWN, -0.01)
+    stopped = translate(end, DOWN, -0.01)
     robot = SimpleNamespace(T=stopped, macro="insert-into", follow=lambda line, guard: 0.01)
     grip = Grip(np.eye(4), 0.01)
     transfer = SimpleNamespace(front=np.zeros(3), slide_n=1.0)
-    _, T_search = press_in(robot, transfer, grip, steady(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
+    _, T_search = press_in(robot, transfer, grip, steady_trajectory(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
     assert T_search == pytest.approx(second @ first)

@@ -16,6 +16,7 @@ from apo_bench.assembly import Observation
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene import settling
 from apo_bench.simulation.scene.settling import settle
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
@@ -23,7 +24,6 @@ from apo_bench.trial.stages import (
     scene_of,
     simulate_demonstration,
 )
-from apo_bench.trial.trial import noise_of, run_trial
 
 SETTINGS = TrialConfig("block_on_block", method="uncorrected", noise_mm=0.5, noise_deg=0.5, seed=1)
 TICKS = 40

@@ -43,7 +43,7 @@ def row(contact_source: str, method: str = "contact", seed: int = 0, **changes: 
         "human_error_scale": 0.0,
     }
     counts = {"contacts_true_positive": 3, "contacts_false_negative": 0, "contacts_false_positive": 0}
-    noise_level = {"noise_level": 1.0, "noise_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
+    noise_level = {"noise_mm": 1.0, "noise_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
     return base | noise_level | counts | changes
 
 
@@ -141,7 +141,7 @@ def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["recognise", "stick_in_tower", "--observation", SEEN, "--contact-source", "detected-jointly"]
+    asked = ["detect-contacts", "stick_in_tower", "--observation", SEEN, "--contact-source", "detected-jointly"]
     assert cli.main(asked) == 0
     said = capsys.readouterr().out
     assert "this set of contacts is right with probability 0.9" in said or "with probability 1.00" in said
@@ -154,7 +154,8 @@ def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) 
 
 def test_nothing_is_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
-        cli.main(["recognise", "stick_in_tower", "--noise-level", "0", "--human-error-scale", "1", "--seed", "3"]) == 0
+        cli.main(["detect-contacts", "stick_in_tower", "--noise-level", "0", "--human-error-scale", "1", "--seed", "3"])
+        == 0
     )
     said = capsys.readouterr().out
     assert " 0.00 " in said
@@ -169,7 +170,7 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
     cells[x] = str(float(cells[x]) + 30.0)
     path = tmp_path / "lifted.csv"
     path.write_text("\n".join([header, ",".join(cells), *rest]) + "\n", encoding="utf-8")
-    assert cli.main(["recognise", "stick_in_tower", "--observation", str(path), "--json"]) == 0
+    assert cli.main(["detect-contacts", "stick_in_tower", "--observation", str(path), "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
     assert form["schema"] == "apo-bench/recognised/2"
     assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
@@ -181,13 +182,13 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["recognise", "stick_in_tower", "--contact-source", "given"], "unknown way of recognising 'given'"),
+        (["detect-contacts", "stick_in_tower", "--contact-source", "given"], "unknown way of recognising 'given'"),
         (
-            ["recognise", "stick_in_tower", "--observation", SEEN, "--noise-level", "1"],
+            ["detect-contacts", "stick_in_tower", "--observation", SEEN, "--noise-level", "1"],
             "--noise-level, which draws a trial",
         ),
         (
-            ["replay", "stick_in_tower", "--observation", SEEN, "--contact-source", "missed"],
+            ["run", "stick_in_tower", "--observation", SEEN, "--contact-source", "missed"],
             "--contact-source was given together",
         ),
     ],
@@ -201,7 +202,7 @@ def test_wrong_requests_get_one_sentence(arguments: list[str], words: str, capsy
 
 def test_a_measured_observation_may_be_recognised(capsys: pytest.CaptureFixture[str]) -> None:
     wanted = ["--method", "contact", "--contact-source", "detected", "--json"]
-    assert cli.main(["replay", "stick_in_tower", "--observation", SEEN, *wanted]) == 0
+    assert cli.main(["run", "stick_in_tower", "--observation", SEEN, *wanted]) == 0
     made = json.loads(capsys.readouterr().out)
     assert (made["success"], made["noise"], made["contact_source"]) == (True, "measured", "detected")
     assert (made["contacts_true_positive"], made["contacts_false_negative"], made["contacts_false_positive"]) == (

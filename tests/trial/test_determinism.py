@@ -14,7 +14,7 @@ import pytest
 
 from apo_bench import Scene, SweepConfig, TrialConfig, build_scene, load_scenario, run_sweep, run_trial
 from apo_bench.cli.app import main
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.trial.stages import simulate_demonstration
 
 HOPELESS = 40.0
@@ -58,7 +58,7 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
     for workers in (None, 3):
         folder = tmp_path / str(workers)
         rows = run_sweep(grids, folder, workers=workers)
-        assert rows == read_rows(folder)
+        assert rows == read_records(folder)
         written[workers] = sorted((folder / "trials.jsonl").read_bytes().splitlines())
     assert len(written[None]) == 8 + 4
     assert written[None] == written[3]
@@ -103,10 +103,10 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     assert process.returncode == 130
     assert complaint.startswith("apo-bench: interrupted")
     assert "Traceback" not in complaint
-    left = read_rows(out)
+    left = read_records(out)
     assert 0 < len(left) < 16
     assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
     assert main(command) == 0
-    rows = read_rows(out)
+    rows = read_records(out)
     assert rows[: len(left)] == left
     assert len({json.dumps(row) for row in rows}) == 16

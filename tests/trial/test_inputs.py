@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import trimesh
 
+import apo_bench
 from apo_bench import InputError, SweepConfig, run_sweep
 from apo_bench.io import named_files
 from apo_bench.resources import folder
-from apo_bench.trial.inputs import module_files
-from tests.trial.test_code_version import PACKAGE
+from apo_bench.trial.inputs import module_files, own_content
 
 AUDITED = """
 import json, os, sys
@@ -45,9 +45,9 @@ def add_and_note(spec, body, picture):
 part_file.add_picture = add_and_note
 from apo_bench import TrialConfig
 from apo_bench.trial import inputs
-from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.stages import scene_of
-from apo_bench.trial.trial import run_trial
+from apo_bench.trial.run import run_trial
 
 read = mujoco.MjSpec.from_file
 
@@ -68,7 +68,7 @@ settings = TrialConfig(str(home / "scenario.toml"), **given)
 content = "not read before the trial"
 scene = scene_of(settings)
 row = run_trial(settings, scene, content=content)
-assert row["promised"] is not None, row["sentence"]
+assert row["predicted_success"] is not None, row["sentence"]
 of_python = tuple(map(os.path.realpath, (sys.prefix, sys.base_prefix, "/proc", "/sys", "/dev", "/etc", "/usr")))
 files = sorted(
     file for file in opened
@@ -78,7 +78,7 @@ files = sorted(
 
 def identity():
     inputs._module_digest.cache_clear()
-    return spec_hash(settings, content_hash(scene.scenario, settings.scenario, scene.arm.files))
+    return config_hash(settings, content_hash(scene.scenario, settings.scenario, scene.arm.files))
 
 before = identity()
 assert identity() == before
@@ -170,11 +170,14 @@ def write_home(home: Path) -> None:
 
 OWN = {
     *("own_peg.xml", "own_peg.toml", "look.stl", "arm.xml", "rest.xml", "meshes/hat.stl", "meshes/skin.png"),
-    *("own/__init__.py", "own/arms.py", "own/noise.py", "own/shifts.py", "own/relations.py"),
+    *("own/__init__.py", "own/arms.py", "own/noise.py", "own/shifts.py", "own/contact_source.py"),
 }
 SHIPPED = {"scenario.toml", "assets/room.xml", "assets/parts/bored_plate.toml"}
 GIVEN = (
-    ({"arm": "own.arms:arm", "noise": "own.noise:blurred", "contact_source": "own.relations:given"}, OWN | SHIPPED),
+    (
+        {"arm": "own.arms:arm", "noise": "own.noise:blurred", "contact_source": "own.contact_source:given"},
+        OWN | SHIPPED,
+    ),
     ({"noise": "camera.toml"}, {"camera.toml", "assets/arms/six_axis.xml", "assets/arms/six_axis.toml"} | SHIPPED),
 )
 
@@ -186,7 +189,7 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
     home = tmp_path.resolve()
     write_home(home)
     settings = json.dumps({"seed": 5, "method": "contact-robust", "min_predicted_success": 1.0, **given})
-    command = [sys.executable, "-c", AUDITED, str(home), str(PACKAGE), settings]
+    command = [sys.executable, "-c", AUDITED, str(home), str(Path(apo_bench.__file__).parent), settings]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     changed = json.loads(done.stdout.splitlines()[-1])
@@ -206,7 +209,7 @@ def test_a_sweep_is_not_continued_with_a_part_of_another_density(tmp_path: Path)
     assert len(run_sweep(grid, tmp_path / "out")) == 1
     beside = tmp_path / "own_peg.toml"
     beside.write_text(beside.read_text().replace("density = ", "density = 1"))
-    with pytest.raises(InputError, match=r"another sweep \(inputs changed: scenario, part peg\); choose"):
+    with pytest.raises(InputError, match=r"another sweep \(inputs: scenario, part peg was .*\); choose"):
         run_sweep(replace(grid, trials=2), tmp_path / "out")
 
 
@@ -226,6 +229,16 @@ def test_a_model_names_its_files_wherever_they_are_stated(tmp_path: Path) -> Non
     assert named_files(tmp_path / "not_there.xml") == (tmp_path / "not_there.xml",)
 
 
+def test_your_own_code_counts_where_it_makes_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "own_noise_1.py").write_text("def blur(goals, rng): return goals\n")
+    (tmp_path / "own_noise_2.py").write_text("def blur(goals, rng): return goals + 0\n")
+    one, two = (own_content("noise", f"own_noise_{k}:blur") for k in (1, 2))
+    assert list(one) == ["noise own_noise_1:blur"]
+    assert list(one.values()) != list(two.values())
+    assert own_content("contact_source", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
+
+
 def test_a_module_counts_with_what_it_imports_from_the_same_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -235,7 +248,7 @@ def test_a_module_counts_with_what_it_imports_from_the_same_place(
         "kit_of_tests/main.py": "import numpy\nfrom . import near\ndef late():\n    import beside_of_tests\n",
         "kit_of_tests/near.py": "from kit_of_tests.far.end import x\n",
         "kit_of_tests/far/__init__.py": "",
-        "kit_of_tests/far/end.py": "x = (",
+        "kit_of_tests/far/end.py": "x = 1",
         "kit_of_tests/unused.py": "",
         "beside_of_tests.py": "import kit_of_tests.main, apo_bench, json\n",
     }

@@ -10,7 +10,8 @@ import pytest
 from apo_bench import Observation, Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
-from apo_bench.trial.planning import apply_method, goals_by_heart
+from apo_bench.trial.nominal import fit_nominal_poses
+from apo_bench.trial.planning import apply_method
 
 SCENARIO = load_scenario("stick_in_tower")
 
@@ -26,7 +27,7 @@ def seen(goals: Array, sigma: float = 1e-3) -> Observation:
 def test_a_nominal_layout_is_found_wherever_it_stands(yaw: float) -> None:
     """The solver stops at a relative step of 1e-8: 1e-8 m was found."""
     layout = layout_at(SCENARIO, 0.13, -0.05, yaw)
-    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, seen(layout.poses)), layout.poses, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(fit_nominal_poses(SCENARIO.goals, seen(layout.poses)), layout.poses, rtol=0, atol=1e-6)
 
 
 def test_the_assembly_is_always_the_same() -> None:
@@ -35,7 +36,7 @@ def test_the_assembly_is_always_the_same() -> None:
     goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses @ np.array(
         [pose.exp(np.repeat([4e-3, 0.07], 3) * rng.standard_normal(6)) for _ in SCENARIO.goals]
     )
-    planned = goals_by_heart(SCENARIO.goals, seen(goals))
+    planned = fit_nominal_poses(SCENARIO.goals, seen(goals))
     for k in range(1, len(planned)):
         apart, nominal = (pose.inverse(each[0]) @ each[k] for each in (planned, SCENARIO.goals))
         np.testing.assert_allclose(apart, nominal, rtol=0, atol=1e-12)
@@ -45,7 +46,7 @@ def test_the_assembly_is_always_the_same() -> None:
 def test_no_other_place_fits_better() -> None:
     """The sum of squares of the twists, a quadratic form of body twists, is least where the goals were put."""
     goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses
-    found = goals_by_heart(SCENARIO.goals, seen(goals))
+    found = fit_nominal_poses(SCENARIO.goals, seen(goals))
 
     def misfit(planned: Array) -> float:
         return sum(float(np.sum(pose.log(pose.inverse(a) @ b) ** 2)) for a, b in zip(planned, goals, strict=True))
@@ -61,7 +62,7 @@ def test_operations_that_were_not_seen_are_left_out() -> None:
     goals = np.array(layout.poses)
     goals[1, :3, 3] += 1.0
     partly = replace(seen(goals), observed=np.array([True, False, True]))
-    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, partly), layout.poses, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(fit_nominal_poses(SCENARIO.goals, partly), layout.poses, rtol=0, atol=1e-6)
     nothing = apply_method("nominal", replace(partly, observed=np.zeros(3, dtype=bool)), None, where=SCENARIO)
     assert nothing.plan is None
     assert nothing.failure is not None

@@ -13,7 +13,7 @@ from apo_bench.assembly import Poses, Reached, Snapshot, placements
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry import Array, pose
-from apo_bench.trial.outcome_columns import goal_errors, pose_errors
+from apo_bench.trial.pose_error import goal_errors, pose_errors
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

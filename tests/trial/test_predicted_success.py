@@ -15,19 +15,20 @@ from apo_bench.benchmark.analysis import tally
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
 from apo_bench.records import TrialRecord
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.trial import trial
+from apo_bench.trial import run
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.predicted_success import Explanation, abstained, drawn_truths, predict_success
+from apo_bench.trial.predicted_success import Explanation, abstain, drawn_truths, predict_success
 from apo_bench.trial.predicted_success_table import RATES, SCORES
 from apo_bench.trial.robot_draws import brought
+from apo_bench.trial.run import noise_of
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
     observe_demonstration,
     simulate_demonstration,
 )
-from apo_bench.trial.trial import noise_of
 
 SCENARIO = "stick_in_tower"
 SEED = 4
@@ -124,7 +125,7 @@ def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
     plan = correct(seen, "contact").plan(seen)
     error = draw_robot_error(error_name, pocket, SEED)
     assert error is not None
-    reached = replay(plan, pocket, fidelity="near-contact", error=error).reached
+    reached = replay(plan, pocket, config=ExecutionConfig("near-contact", robot_error=error)).reached
     states = brought(plan, pocket, error)
     resting = [snapshot for snapshot in reached.after if snapshot is not None]
     for before, state, operation in zip(resting, states[1:], plan.assembly.operations[1:], strict=False):
@@ -192,7 +193,7 @@ def test_below_abstain_the_arm_never_moves(
 ) -> None:
     carried_out = row(scene, simulated)
     least = min(1.0, carried_out["predicted_success"] + 1e-6)
-    monkeypatch.setattr(trial, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
+    monkeypatch.setattr(run, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     kept = row(scene, simulated, min_predicted_success=least)
     assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
     assert (kept["sim_time_s"], kept["reached"]) == (None, None)
@@ -200,9 +201,9 @@ def test_below_abstain_the_arm_never_moves(
 
 
 def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
-    assert abstained(0.9472, 0.95).sentence.endswith(": 0.947, where 0.95 is asked")
-    assert abstained(0.9472, 1).sentence.endswith(": 0.95, where 1 is asked")
-    assert abstained(0.6999, 0.7).sentence.endswith(": 0.6999, where 0.7 is asked")
+    assert abstain(0.9472, 0.95).sentence.endswith(": 0.947, where 0.95 is required")
+    assert abstain(0.9472, 1).sentence.endswith(": 0.95, where 1 is required")
+    assert abstain(0.6999, 0.7).sentence.endswith(": 0.6999, where 0.7 is required")
 
 
 def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, simulated: SimulatedDemonstration) -> None:

@@ -40,7 +40,7 @@ def row(scene: Scene, **more: Any) -> TrialRecord:
 def test_a_row_says_what_was_felt_and_with_what(scene: Scene) -> None:
     found = row(scene, ft_sensor="ideal", assumed_robot_error="hand_eye:1/0.2")
     assert (found["ft_sensor"], found["assumed_robot_error"]) == ("ideal", "hand_eye:1/0.2")
-    assert found["touches"]
+    assert found["probe_contacts"]
     for column in FELT[2:]:
         assert look_up(found, column) > 0.0
     assert unwritable(found) == ""

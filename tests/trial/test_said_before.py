@@ -12,7 +12,7 @@ from apo_bench.assembly import Observation
 from apo_bench.geometry import Array
 from apo_bench.records import WITHOUT_CORRECTOR
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial import trial
+from apo_bench.trial import run
 from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
 
 MISSED = TrialConfig(
@@ -31,7 +31,7 @@ SAID = (
     "gap_after_mm",
     "fit_adjustments",
     "corrected_operations",
-    "tried",
+    "tried_corrections",
     "chi_square",
     "sentence",
 )
@@ -41,18 +41,19 @@ SAID = (
 def given() -> tuple[Scene, Observation, Array]:
     scene = scene_of(MISSED)
     simulated = simulate_demonstration(scene, MISSED.human_error_scale, MISSED.seed)
-    seen = observe_demonstration(simulated, trial.noise_of(MISSED, scene, simulated), MISSED.seed)
+    seen = observe_demonstration(simulated, run.noise_of(MISSED, scene, simulated), MISSED.seed)
     return scene, seen, simulated.layout.poses
 
 
 def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation, Array]) -> None:
     scene, seen, truth = given
-    told = trial._corrector_input(MISSED, seen, truth)
+    told = run._choose_contacts(MISSED, seen, truth)
     missed = replace(seen, assembly=told.assembly)
     assert len(told.assembly.relations()) == len(seen.assembly.relations()) - 1
     said: list[dict[str, Any]] = []
     for right in (seen, missed):
-        row: Any = trial._row(MISSED, scene, right, told, truth, truth, None, None, None, None)
+        context = run.RunContext(scene, MISSED, MISSED.method)
+        row: Any = run._plan_and_replay(context, right, told, truth, None)
         said.append({name: row[name] for name in SAID})
     assert said[0] == said[1]
     assert (said[0]["failure_prediction"]["fails"], said[0]["failure_prediction"]["code"]) == (False, "ok")
@@ -60,7 +61,7 @@ def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation
 
 def test_a_contact_that_was_missed_is_not_foreseen_to_fail(given: tuple[Scene, Observation, Array]) -> None:
     scene, *_ = given
-    row: Any = trial.run_trial(MISSED, scene)
+    row: Any = run.run_trial(MISSED, scene)
     assert row["predicted_success"] > 0.9
     assert not row["failure_prediction"]["fails"]
     assert row["contacts_false_negative"] == 1
@@ -69,4 +70,4 @@ def test_a_contact_that_was_missed_is_not_foreseen_to_fail(given: tuple[Scene, O
 @pytest.mark.parametrize("method", WITHOUT_CORRECTOR)
 def test_what_is_not_corrected_keeps_the_right_contacts(method: str, given: tuple[Scene, Observation, Array]) -> None:
     _, seen, truth = given
-    assert trial._corrector_input(replace(MISSED, method=method), seen, truth) is seen
+    assert run._choose_contacts(replace(MISSED, method=method), seen, truth) is seen

@@ -30,9 +30,10 @@ from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.trial import stages
 from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.nominal import move_nominal_poses
 from apo_bench.trial.planning import apply_method
+from apo_bench.trial.run import run_measured
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
-from apo_bench.trial.trial import nominal_where_seen, run_measured
 
 SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 
@@ -313,7 +314,7 @@ def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown
     layout = shown.layout.poses
     nominal = scene.scenario.goals
     exact = replace(observed(scene, shown), poses=layout)
-    reference = nominal_where_seen(nominal, exact)
+    reference = move_nominal_poses(nominal, exact)
     np.testing.assert_allclose(reference[0], layout[0], rtol=0, atol=1e-12)
     steps = [pose.inverse(goals[0]) @ goals[1] for goals in (reference, nominal)]
     np.testing.assert_allclose(steps[0], steps[1], rtol=0, atol=1e-12)

@@ -13,11 +13,11 @@ from apo_bench import InputError, Plan, Scene, build_scene, load_scenario
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.probing.feeling import ACTS
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
+from apo_bench.simulation.execution.probing.lay_flat import averaged_s
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
-from apo_bench.simulation.execution.probing.touching import averaged_s
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.simulation.robot.by_wrist import wrist_of
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.viz.acts_form import acts_form
@@ -84,22 +84,24 @@ def test_only_what_has_walls_to_fit_into_is_touched_from_the_side() -> None:
 @pytest.mark.parametrize(("name", "frames"), [("stick_in_tower", "tip"), ("peg_in_hole", "flange")])
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
-    for one, (step, t) in zip(form(name, frames)["steps"], moves(plan(name), scene(name), True, ACTS), strict=True):
+    for one, (step, t) in zip(
+        form(name, frames)["steps"], moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
+    ):
         assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
         for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):
             assert np.allclose(tip(said["at"], frames), t.T_world_start @ grip.T_part_tip, atol=1e-9)
             assert said["each_finger_open_mm"] > said["closed_on_part_mm"] == pytest.approx(1e3 * grip.half_width)
         assert one["guards_n"]["insert"] == pytest.approx(t.insert_n, abs=1e-6)
         assert (one["search_press_n"] is None) == (t.front is None)
-        assert (one["lay_flat"] is None) == (t.flush is None)
-        if t.flush is not None:
+        assert (one["lay_flat"] is None) == (t.flat is None)
+        if t.flat is not None:
             laid = one["lay_flat"]
             part = tip(laid["at"], frames) @ matrix(laid["part_in_tip"])
             n, d = plane(laid, frames)
             feet = pose.apply(part, 1e-3 * np.array(laid["feet_in_part_mm"]))
-            assert np.allclose(part, t.flush.T, atol=1e-9)
+            assert np.allclose(part, t.flat.T, atol=1e-9)
             assert feet @ n == pytest.approx(d, abs=1e-9)
-            for told, place in zip(laid["then_walls"], t.beside, strict=True):
+            for told, place in zip(laid["then_walls"], t.side_touches, strict=True):
                 begins = tip(told["from"], frames) @ matrix(laid["part_in_tip"])
                 n, d = plane(told, frames)
                 assert np.allclose(begins, place.T, atol=1e-9)
@@ -110,14 +112,14 @@ def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
 def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor_that_cannot_tell() -> None:
     def averaged(name: str, sensor: str) -> list[float | None]:
         laid = [one["lay_flat"] for one in form(name, sensor=sensor)["steps"]]
-        flat = [move.transfer.flush for move in moves(plan(name), scene(name), True, ACTS)]
+        flat = [move.transfer.flat for move in moves(plan(name), scene(name), True, PROBING_ACTIONS)]
         return [each and each["averaged_over_s"] for each, f in zip(laid, flat, strict=True) if f is not None]
 
     for sensor, felt in (("wrist", 0.1), ("joint-torque", 3.5)):
         sigma = wrist_of(
             Robot(scene("stick_in_tower"), plan("stick_in_tower").start), sensor, np.random.default_rng(0)
         ).sigma
-        flush = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ACTS)[-1].transfer.flush
+        flush = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, PROBING_ACTIONS)[-1].transfer.flat
         assert sigma[0] < felt
         assert averaged("stick_in_tower", sensor) == [pytest.approx(averaged_s(flush, sigma), abs=1e-6)]
     assert averaged("peg_in_hole", "joint-torque") == [None]

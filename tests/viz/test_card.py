@@ -10,8 +10,7 @@ import pytest
 from apo_bench import load_scenario
 from apo_bench.scenario.file import scenario_names
 from apo_bench.viz.card import cards, scenario_card
-from benchmarks.asks import HEAD, asks, by_heart
-from benchmarks.baselines import kept
+from benchmarks.baselines import HEAD, describe, describe_nominal, read_counts
 
 JUDGE = Path(__file__).parents[2] / "docs" / "how" / "judge.md"
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
@@ -66,7 +65,9 @@ def test_every_scenario_says_all_of_it(name: str) -> None:
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
     scenarios = [load_scenario(name) for name in scenario_names()]
-    measured = {scenario.name: asks(scenario, kept()) for scenario in scenarios}
-    written = cards(scenarios, "python docs/cards.py", "../pictures/graph_{}.png", HEAD, measured)
-    assert PAGE.read_text(encoding="utf-8") == written, "run: python docs/cards.py"
-    assert by_heart(scenarios, kept()) in JUDGE.read_text(encoding="utf-8"), "run: python docs/cards.py"
+    measured = {scenario.name: describe(scenario, read_counts()) for scenario in scenarios}
+    written = cards(scenarios, "python docs/task_sheets.py", "../pictures/graph_{}.png", HEAD, measured)
+    assert PAGE.read_text(encoding="utf-8") == written, "run: python docs/task_sheets.py"
+    assert describe_nominal(scenarios, read_counts()) in JUDGE.read_text(encoding="utf-8"), (
+        "run: python docs/task_sheets.py"
+    )

@@ -1,4 +1,4 @@
-"""`apo-bench show`: what is believed, drawn and said."""
+"""`apo-bench inspect poses`: what is believed, drawn and said."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     import imageio.v3 as imageio
 
     out = tmp_path / "seen.png"
-    assert cli.main(["show", "stick_in_tower", "--observation", "docs/seen.csv", "--out", str(out)]) == 0
+    assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", "docs/seen.csv", "--out", str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("as seen: largest gap 5.466 mm; open: ")
     assert said[1:] == ["corrected by contact-robust: largest gap 0.000 mm; all hold", f"Wrote {out}"]
@@ -73,11 +73,11 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     ],
 )
 def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["show", "stick_in_tower", *arguments]) == 2
+    assert cli.main(["inspect", "poses", "stick_in_tower", *arguments]) == 2
     said = capsys.readouterr()
     assert part in said.err
     assert said.err.count("\n") == 1
-    assert not Path("believed.png").exists()
+    assert not Path("estimates.png").exists()
 
 
 def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -86,11 +86,11 @@ def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFi
     path = tmp_path / "half.csv"
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     out = tmp_path / "x.png"
-    assert cli.main(["show", "stick_in_tower", "--observation", str(path), "--out", str(out)]) == 1
+    assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", str(path), "--out", str(out)]) == 1
     assert "operation 2 was not seen, so nothing is known after it; --seen --step 1 shows" in capsys.readouterr().err
     assert not out.exists()
     only = ("--seen", "--step", "1")
-    assert cli.main(["show", "stick_in_tower", "--observation", str(path), *only, "--out", str(out)]) == 0
+    assert cli.main(["inspect", "poses", "stick_in_tower", "--observation", str(path), *only, "--out", str(out)]) == 0
     assert capsys.readouterr().out.startswith("as seen: largest gap")
 
 
@@ -112,7 +112,7 @@ def test_what_speaks_against_a_correction_is_said(
 ) -> None:
     """Planes that coincide a metre apart are no contact."""
     asked = ["stick_in_tower", "--observation", str(far), "--method", "contact"]
-    assert cli.main(["show", *asked, "--out", str(tmp_path / "far.png")]) == 0
+    assert cli.main(["inspect", "poses", *asked, "--out", str(tmp_path / "far.png")]) == 0
     _, corrected, assumed, _ = capsys.readouterr().out.splitlines()
     assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: beside it")
     for said in (
@@ -121,7 +121,7 @@ def test_what_speaks_against_a_correction_is_said(
     ):
         assert said in corrected
     assert assumed == "a standard deviation of 1 mm and 1 deg per axis, assumed where the file states none"
-    assert cli.main(["plan", *asked, "--deviation-mm", "3"]) == 0
+    assert cli.main(["inspect", "plan", *asked, "--deviation-mm", "3"]) == 0
     *_, assumed, wrong = capsys.readouterr().out.splitlines()
     assert assumed == "a standard deviation of 3 mm and 1 deg per axis, assumed where the file states none"
     assert wrong.startswith("the stated noise does not explain the correction (p = ")

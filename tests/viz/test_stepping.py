@@ -31,7 +31,7 @@ def with_target_poses(scene: Scene) -> Rollout:
     true = scene.scenario.goals
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
-    return Rollout(scene, rollout.chapters, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
+    return Rollout(scene, rollout.segments, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
 
 
 def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> None:
@@ -41,16 +41,16 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
     seen = []
     for _ in range(4):
         cursor.press("next operation")
-        seen.append(cursor.moment.doing.operation)
+        seen.append(cursor.moment.phase.operation)
     assert seen == [0, 1, 2, 2]
     last = cursor.snapshot()
     assert set(last.faces) == {of for contact in assembly.operations[2].contacts for of in contact}
     assert last.words[0].endswith("operation 3 of 3, stick: in place")
-    poses = part_poses(last.chapter, last.moment)
+    poses = part_poses(last.segment, last.moment)
     for part, T in cursor.rollout.assembled.items():
         np.testing.assert_allclose(poses[part], T, atol=1e-9)
     cursor.press("previous operation")
-    assert cursor.moment.doing.operation == 1
+    assert cursor.moment.phase.operation == 1
     for faces in (FACES[2], FACES[0]):
         cursor.press("faces")
         assert cursor.faces == faces
@@ -59,11 +59,11 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
     assert (cursor.place, cursor.playing) == (3, False)
 
 
-def test_chapters_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None:
+def test_segments_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None:
     one = scenario_story(tower)
-    cursor = Cursor(Rollout(tower, (one.chapters[0], replace(one.chapters[0], title="again")), one.assembled))
-    cursor.press("next chapter")
-    assert (cursor.place, cursor.chapter.title) == (4, "again")
+    cursor = Cursor(Rollout(tower, (one.segments[0], replace(one.segments[0], title="again")), one.assembled))
+    cursor.press("next segment")
+    assert (cursor.place, cursor.segment.title) == (4, "again")
     cursor.press("previous")
     cursor.press("play")
     assert (cursor.place, cursor.playing) == (0, True)
@@ -72,7 +72,7 @@ def test_chapters_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None
     cursor.pass_time(9.0)
     assert (cursor.place, cursor.playing) == (3, False)
     cursor.go(99)
-    cursor.press("previous chapter")
+    cursor.press("previous segment")
     assert cursor.place == 4
 
 
@@ -88,7 +88,7 @@ def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> 
     assert cursor.words()[-2:] == ("orange: as seen", "violet: true")
     shifts = [seen.poses[part][:3, 3] - true.poses[part][:3, 3] for part in seen.poses]
     np.testing.assert_allclose(shifts, [(0.01, 0.0, 0.0)] * 2, atol=1e-12)
-    shapes = list(shapes_of(tower, initial_state(tower.work, cursor.chapter.start), cursor.snapshot()))
+    shapes = list(shapes_of(tower, initial_state(tower.work, cursor.segment.start), cursor.snapshot()))
     labels = [kind.label for kind, _ in shapes if kind.label]
     assert labels == [str(face) for face in cursor.snapshot().faces]
     names = [tower.work.free.index("castle1"), tower.work.free.index("castle2")]
@@ -100,9 +100,9 @@ def test_shapes_are_as_large_as_what_they_stand_for_and_where_it_is(tower: Scene
     """The castles and the stick at the end: the corners of all their shapes are those of their solids."""
     cursor = Cursor(scenario_story(tower))
     cursor.go(3)
-    poses = part_poses(cursor.chapter, cursor.moment)
+    poses = part_poses(cursor.segment, cursor.moment)
     points = []
-    for kind, at in shapes_of(tower, initial_state(tower.work, cursor.chapter.start), cursor.snapshot()):
+    for kind, at in shapes_of(tower, initial_state(tower.work, cursor.segment.start), cursor.snapshot()):
         color = next((part for part, rgb in tower.scenario.colors.items() if np.allclose(kind.rgba[:3], rgb)), None)
         if color in tower.work.free and not kind.label:
             points.append(pose.apply(pose.unpack(at), surface(tower.work.model, kind).vertices))
@@ -177,7 +177,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
         name: row[name] for name in ("success", "worst_gap_mm")
     }
     assert set(rollout.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
-    reached = part_poses(rollout.chapters[1], rollout.chapters[1].moments[-1])
+    reached = part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():
         np.testing.assert_allclose(1e3 * reached[part][:3, 3], packed[:3], atol=0.01)
@@ -194,8 +194,8 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
         ("view", "stick_in_tower", "--port", "8090"): "--port 8090 was given, which is for a browser, but viser is not",
         ("view", "stick_in_tower", "--port", "70000"): "a whole number from 1 to 65535 is allowed",
         ("view", "stick_in_tower", "--trial", "1"): "--trial, which is for the folder of a sweep",
-        ("replay", "stick_in_tower", "--port", "8090"): "--port 8090, which is for --view, was given without it",
-        ("replay", "stick_in_tower", "--view"): "no window can be opened here (none)",
+        ("run", "stick_in_tower", "--port", "8090"): "--port 8090, which is for --view, was given without it",
+        ("run", "stick_in_tower", "--view"): "no window can be opened here (none)",
     }
     for request, sentence in said.items():
         assert main(request) == 2

@@ -14,7 +14,7 @@ from rich.console import Console
 from apo_bench import Correction, Observation
 from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.geometry import pose
-from apo_bench.perception.detection.evidence import Evidence, Recognised, Rival
+from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
 from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
 from apo_bench.simulation.arms.finding import find_arm
@@ -58,7 +58,7 @@ def corrected(observation: Observation, **changes: object) -> Correction:
 def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     observation = tower()
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
-    recognised = Recognised(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
+    recognised = DetectedContacts(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
     form = recognition_form("tower", "detected", observation, recognised, False)
     _, right, wrong = table_lines(evidence_table(form))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
@@ -76,9 +76,9 @@ def test_a_set_of_contacts_that_is_not_likely_is_called_not_certain() -> None:
     observation = tower()
     solids = list(observation.assembly.solids.values())
     fewer = scenes.scene(solids, observation.assembly.operations[:2], scenes.stick_in_tower().goals[:2])
-    recognised = Recognised(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
+    recognised = DetectedContacts(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
 
-    def said(recognised: Recognised) -> list[str]:
+    def said(recognised: DetectedContacts) -> list[str]:
         return confidence_lines(recognition_form("tower", "detected", observation, recognised, False))
 
     (line,) = said(recognised)
@@ -94,7 +94,7 @@ def test_contacts_that_were_missed_are_named() -> None:
     fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
     forms = [
         recognition_form("tower", "detected", observation, recognised, False)
-        for recognised in (Recognised(observation.assembly, every), Recognised(fewer.assembly, every[:1]))
+        for recognised in (DetectedContacts(observation.assembly, every), DetectedContacts(fewer.assembly, every[:1]))
     ]
     assert difference_lines(forms[0]) == [f"all {len(every)} contacts of the scenario were recognised, and no other"]
     first, *missed = difference_lines(forms[1])

@@ -33,7 +33,7 @@ class HalfLevel:
     largest: float
     trials: int
     """Results over all levels."""
-    noise_level: float | None
+    noise_mm: float | None
     """The estimate; None where it lies outside the levels tried."""
     beyond: str | None
     """On which side of them it lies, `below` or `above`."""
@@ -45,8 +45,8 @@ class HalfLevel:
     @property
     def text(self) -> str:
         """`1.31`, `> 4`, `< 0.1`."""
-        if self.noise_level is not None:
-            return f"{self.noise_level:.3g}"
+        if self.noise_mm is not None:
+            return f"{self.noise_mm:.3g}"
         return f"> {self.largest:g}" if self.beyond == "above" else f"< {self.smallest:g}"
 
     @property
@@ -84,7 +84,7 @@ def half_level(place: Place, cells: Sequence[Cell]) -> HalfLevel:
         smallest=float(levels[met][0]),
         largest=float(levels[-1]),
         trials=int(trials.sum()),
-        noise_level=None if beyond else float(np.exp(np.interp(0.5, falling[::-1], x[::-1]))),
+        noise_mm=None if beyond else float(np.exp(np.interp(0.5, falling[::-1], x[::-1]))),
         beyond=beyond,
         surely_over=float(levels[over - 1]) if over else None,
         surely_under=float(levels[-under]) if under else None,

@@ -33,11 +33,11 @@ def _line(place: Place, trials: Trials) -> Line:
         "refused": int(trials.number("probe_contacts_rejected").sum()),
         "drawn_mm": drawn_mm,
         "stated_mm": stated_mm,
-        "base_error_estimate_mm": root_mean_square(trials.number("base_error_estimate_mm")),
+        "estimated_mm": root_mean_square(trials.number("base_error_estimate_mm")),
         "sure_mm": root_mean_square(trials.number("base_error_std_mm")),
         "drawn_deg": drawn_deg,
         "stated_deg": stated_deg,
-        "base_error_estimate_deg": root_mean_square(trials.number("base_error_estimate_deg")),
+        "estimated_deg": root_mean_square(trials.number("base_error_estimate_deg")),
         "sure_deg": root_mean_square(trials.number("base_error_std_deg")),
     }
 

@@ -9,7 +9,7 @@ from apo_bench.benchmark.analysis.rates import Rate, Records
 from apo_bench.records import DETECTED
 from apo_bench.records.run.trials import Trials, trials_of
 
-_AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_level", "noise_deg")
+_AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_mm", "noise_deg")
 
 
 def recognitions(records: Records) -> list[Line]:
@@ -30,20 +30,18 @@ def recognitions(records: Records) -> list[Line]:
 
 
 def _line(axes: Line, trials: Trials) -> Line:
-    right, missed, false = (trials.number(f"contacts_{of}") for of in ("right", "missed", "false"))
-    complete = Rate(int(((missed == 0) & (false == 0)).sum()), len(trials))
-    counts = {name: int(x.sum()) for name, x in (("right", right), ("missed", missed), ("false", false))}
-    return (
-        axes
-        | counts
-        | {
-            "demonstrations": len(trials),
-            "complete": complete.successes,
-            "all_right": complete,
-            "precision": Rate(counts["right"], counts["right"] + counts["false"]).rate,
-            "recall": Rate(counts["right"], counts["right"] + counts["missed"]).rate,
-        }
-    )
+    missed = trials.number("contacts_false_negative")
+    false = trials.number("contacts_false_positive")
+    right = int(trials.number("contacts_true_positive").sum())
+    return axes | {
+        "right": right,
+        "missed": int(missed.sum()),
+        "false": int(false.sum()),
+        "demonstrations": len(trials),
+        "complete": Rate(int(((missed == 0) & (false == 0)).sum()), len(trials)),
+        "precision": Rate(right, right + int(false.sum())).rate,
+        "recall": Rate(right, right + int(missed.sum())).rate,
+    }
 
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -36,7 +36,7 @@ from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.records import USUAL, TrialConfig, check, noise_pair
 from apo_bench.scenario import Scenario, human_error_covariance, load_scenario, spread_error
-from apo_bench.scenario.layouts import Layouts, draw_layouts
+from apo_bench.scenario.layout import Layouts, draw_layouts
 
 _BY_PART = frozenset(
     (
@@ -61,9 +61,7 @@ class Seen(NamedTuple):
 
 def by_part(noise: Noise) -> bool:
     """Whether a noise model draws many demonstrations at once; others draw one after the other."""
-    shares_view = isinstance(noise, Fitted) and noise.measured.view is not None
-    fails_by_part = isinstance(noise, CameraFailures) and noise.by_part
-    return fails_by_part or (type(noise) in _BY_PART and not shares_view)
+    return type(noise) in _BY_PART or (isinstance(noise, CameraFailures) and noise.by_part)
 
 
 def observe_many(

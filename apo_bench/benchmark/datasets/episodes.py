@@ -12,10 +12,10 @@ from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, write_
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
-from apo_bench.simulation.hooks import Doing, Hooks
-from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_felt
+from apo_bench.simulation.hooks import Hooks, Phase
+from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_sensors_on
+from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
-from apo_bench.trial.trial import noise_of, run_trial
 
 _OF_ROW = MappingProxyType(
     {
@@ -23,7 +23,7 @@ _OF_ROW = MappingProxyType(
         "seed": "number of the trial",
         "method": "what made the plan",
         "noise": "model of the camera",
-        "noise_level": "of the noise, mm",
+        "noise_mm": "of the noise, mm",
         "noise_deg": "of the noise, degrees",
         "human_error_scale": "0 for a careful human, 1 for the scenario's",
         "success": "whether the assembly is right at the end; the judge's word",
@@ -119,14 +119,14 @@ class _Recorder:
     def _planned(self, plan: Plan) -> None:
         self.plan = plan
 
-    def _tick(self, data: Any, doing: Doing) -> None:
+    def _tick(self, data: Any, phase: Phase) -> None:
         at = [part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
             float(data.time),
-            None if doing.operation is None else doing.operation + 1,
-            doing.undoes,
-            doing.macro,
-            float(doing.force_n),
+            None if phase.operation is None else phase.operation + 1,
+            phase.undoes,
+            phase.macro,
+            float(phase.force_n),
             [float(data.joint(f"arm/{joint}").qpos[0]) for joint in self._scene.arm.joints],
             [float(data.joint(f"arm/{finger}").qpos[0]) for finger in self._scene.arm.fingers],
             np.array(data.ctrl),
@@ -173,7 +173,7 @@ def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Itera
         simulated = simulate_demonstration(
             scene, settings.human_error_scale, settings.seed, settings.pose_source, settings.secret_seed
         )
-        with wrist_felt(scene.work.model):
+        with wrist_sensors_on(scene.work.model):
             row = run_trial(settings, scene, simulated=simulated, watch=recorder.hooks())
         yield Replay(scene, _episode(settings, scene, simulated, row, recorder), recorder.frames())
 
@@ -213,7 +213,7 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
     return About(
         name="replays",
         summary="A human assembles parts, a camera sees with an error where each was put, a method plans, a robot arm "
-        "replays, and a judge looks at physics alone. `apo-bench replay` runs the trial of a seed again. Numbers of a "
+        "replays, and a judge looks at physics alone. `apo-bench run` runs the trial of a seed again. Numbers of a "
         f"frame lie between two looks 20 ms apart. Joints and fingers: {', '.join(joints.names)}.",
         command=command,
         fields={

@@ -122,7 +122,7 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     """Where its curve over the level falls to one half; of several settings the worst."""
     if not half:
         return ""
-    worst = min(half, key=lambda h: (h.beyond == "above", h.noise_level or 0.0, h.largest))
+    worst = min(half, key=lambda h: (h.beyond == "above", h.noise_mm or 0.0, h.largest))
     which = "each" if worst.beyond == "above" else "the worst"
     where = f"In {which} of {len(half)} settings its" if len(half) > 1 else "Its"
     if worst.beyond == "above":

@@ -12,7 +12,8 @@ import numpy as np
 from apo_bench.benchmark.analysis import Records, rank
 from apo_bench.benchmark.analysis.rates import was_executed
 from apo_bench.records import SecretSeed, TrialRecord
-from apo_bench.records.run.replay_command import DATA_PREFIXES, Files, is_own_code, left_out
+from apo_bench.records.own_code import DATA_PREFIXES, describe_own_code, is_own_code
+from apo_bench.records.run.replay_command import Files
 from apo_bench.records.run.trials import Mask, Trials, trials_of
 
 
@@ -46,7 +47,7 @@ def draw_failures(trials: Trials, folder: Path, files: Files, how: Pictures) -> 
         return [], []
     chosen = sample(trials, how.most, trust_code=how.trust_code)
     pictures, missing = how.draw(chosen, folder, files, how.secret_seed, trust_code=how.trust_code)
-    without = "" if how.trust_code else left_out(trials.where(_names_code(trials)).rows())
+    without = "" if how.trust_code else describe_own_code(trials.where(_names_code(trials)).rows())
     return pictures, [*missing, *([without] if without else [])]
 
 
@@ -73,7 +74,7 @@ def sample(records: Records, most: int, *, trust_code: bool = False) -> list[Tri
 
 def _names_code(trials: Trials) -> Mask:
     """(n,) whether a trial names code of somebody's own."""
-    named = (trials.holds(column, partial(is_own_code, data=prefixes)) for column, prefixes in DATA_PREFIXES.items())
+    named = (trials.holds(column, partial(is_own_code, column)) for column in DATA_PREFIXES)
     return reduce(or_, named)
 
 

@@ -36,14 +36,14 @@ from apo_bench.benchmark.report.tables.methods import (
     work_table,
 )
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_folders, check_target, has_parquet, write_columns, write_file
+from apo_bench.io import check_target, has_parquet, write_columns, write_file
 from apo_bench.records import check_same_secret_seed, read_secret_seed
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
-PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "detected")
+PNG = ("success_over_noise_level", "success_over_tightness", "success_over_looks", "detected")
 """Figures that are also kept as PNG."""
 FILES = ("cells", "pairs", "half_levels", "detected", "gaps", "confusion", "felt", "times")
 """Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
@@ -106,8 +106,8 @@ def report(
     )
     try:
         check_target(folder / PAGE)
-        check_folders(folder / name for name in (TABLES, FIGURES))
         for name in (TABLES, FIGURES):
+            require(not (folder / name).is_symlink(), f"{folder / name} is a symbolic link; remove it.")
             (folder / name).mkdir(exist_ok=True)
         return _write(folder, trials, numbers, Pictures(pictures, draw, secret_seed, trust_code))
     except OSError as error:

@@ -5,10 +5,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from apo_bench.assembly import Observation
-from apo_bench.benchmark.scoring.program import goals_of, request_line
+from apo_bench.benchmark.scoring.program import parse_answer, request_line
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import parse_json, read_text, write_file
+from apo_bench.io import read_text, write_file
 
 LARGEST_ANSWERS_BYTES = 256_000_000
 """Those for all tracks have 3 MB."""
@@ -48,8 +48,7 @@ def read_answers(path: Path) -> dict[str, Array]:
     text = read_text(path, "file of answers", LARGEST_ANSWERS_BYTES)
     for number, line in enumerate(text.split("\n"), start=1):
         if line.strip():
-            answer = parse_json(line, f"{path}, line {number}")
-            request = answer.fields(("id", "poses"))["id"].text()
+            request, poses = parse_answer(line, f"{path}, line {number}")
             require(request not in answers, f"{path}, line {number}: a second answer for {request}; keep one.")
-            answers[request] = goals_of(answer)
+            answers[request] = poses
     return answers

@@ -16,7 +16,7 @@ from msgspec import Meta
 from apo_bench.benchmark.analysis import Results, pooled_rate
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import HALF_LETTER, UNSHOWN, WHOLE_LETTERS, half_letter, parse_json, read_text, write_file
+from apo_bench.io import UNSHOWN, read_bytes, write_file
 
 SCHEMA: Final = "apo-bench/entry/1"
 _LARGEST_BYTES = 4_000_000
@@ -163,12 +163,9 @@ def read_entry(path: str | Path) -> Entry:
     Raises:
         InputError: It cannot be read, or is something else.
     """
-    document = parse_json(read_text(path, "entry", _LARGEST_BYTES), str(path))
-    field = half_letter(document.value, HALF_LETTER)
-    require(field is None, f"{path}, {field}: {WHOLE_LETTERS}; score the method again.")
     try:
-        return msgspec.convert(document.value, Entry)
-    except msgspec.ValidationError as error:
+        return msgspec.json.decode(read_bytes(path, "entry", _LARGEST_BYTES), type=Entry)
+    except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
         raise InputError(
             f"{path}: this is not an entry that `apo-bench score` writes ({error}); score the method again."
         ) from error

@@ -20,9 +20,10 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
-from apo_bench.formats.json_forms import observation_form
-from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.io import JsonNode, decoded, parse_json
+from apo_bench.formats.json_forms import PoseForm
+from apo_bench.formats.observation_json import observation_form
+from apo_bench.geometry import Array, Face, RoundFace
+from apo_bench.io import Table, convert_typed, decoded, parse_plain
 
 REQUEST = "apo-bench/request/1"
 LARGEST_ANSWER_BYTES = 16_000_000
@@ -63,7 +64,10 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
     require(process.returncode == 0, f"{program} ended with exit code {process.returncode}.")
     require(answer.strip(), f"{program} wrote no answer; one line of JSON is needed.")
     where = f"the answer of {program.removeprefix('the program ')}"
-    return goals_of(parse_json(decoded(answer, where, "JSON"), where), len(observation.poses))
+    _, poses = parse_answer(decoded(answer, where, "JSON"), where)
+    count = len(observation.poses)
+    require(len(poses) == count, f"{where}, poses: {count} entries are needed, {len(poses)} were given.")
+    return poses
 
 
 def request_line(observation: Observation) -> str:
@@ -87,17 +91,26 @@ def request_form(observation: Observation) -> dict[str, Any]:
     return {**form, "schema": REQUEST, "fixed": sorted(assembly.fixed), "faces": faces}
 
 
-def goals_of(answer: JsonNode, operations: int | None = None) -> Array:
-    """The goals of an answer, (n, 4, 4), [m].
+class _Answer(Table, frozen=True, kw_only=True):
+    poses: list[PoseForm]
+    id: str = ""
+
+
+def parse_answer(text: str, where: str) -> tuple[str, Array]:
+    """Parse an answer.
 
     Args:
-        operations: How many there must be; None for any number.
+        where: Where it stands, for the message.
+
+    Returns:
+        Its `id`, and its poses, (n, 4, 4), [m].
 
     Raises:
         InputError: It is no answer.
     """
-    poses = answer.fields(("poses",), ("id",))["poses"].items("goal", operations)
-    return np.array([_pose_of(entry) for entry in poses]).reshape(-1, 4, 4)
+    answer = convert_typed(parse_plain(text, where, "json"), _Answer, where)
+    poses = [form.matrix(f"{where}, pose {i}") for i, form in enumerate(answer.poses, start=1)]
+    return answer.id, np.array(poses).reshape(-1, 4, 4)
 
 
 def _start(command: tuple[str, ...], folder: str, request: bytes) -> subprocess.Popen[bytes]:
@@ -120,12 +133,6 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.kill()
     with suppress(AttributeError, ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-
-
-def _pose_of(node: JsonNode) -> Array:
-    fields = node.fields(("position_mm", "quaternion_wxyz"))
-    q = fields["quaternion_wxyz"].quaternion()
-    return pose.unpack(np.concatenate([fields["position_mm"].numbers(3) / _MM, q / np.linalg.norm(q)]))
 
 
 def _face_form(face: Face | RoundFace) -> dict[str, Any]:

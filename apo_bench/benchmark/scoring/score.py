@@ -98,7 +98,7 @@ def _scored(track: Track, runs: Mapping[str, Sequence[TrialRecord]], run: Mappin
         predicted_success=_mean([p for p, _ in promises]),
         brier=_mean(errors),
         rows=_digest(sorted(json.dumps(row, sort_keys=True) for row in rows)),
-        code=_digest([json.dumps({key: run[key] for key in ("code", "versions", "content")}, sort_keys=True)]),
+        code=_digest([json.dumps({key: run[key] for key in ("versions", "content")}, sort_keys=True)]),
         secret_seed=run.get("secret_seed"),
         cells=cells,
     )

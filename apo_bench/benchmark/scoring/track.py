@@ -14,17 +14,18 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, final
+from typing import Annotated, Any, Literal, final
+
+from msgspec import Meta
 
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.sweeps.grid import SweepConfig
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.errors import require, unknown
-from apo_bench.io import read_bytes, read_toml
+from apo_bench.io import Table, Text, convert_typed, read_bytes, read_plain
 from apo_bench.records import TrialConfig
 from apo_bench.resources import folder
 
-SCHEMA = "apo-bench/track/1"
 TABLE = "track"
 _HEX = 16
 
@@ -52,6 +53,17 @@ class Track:
             replace(grid, **own, trials=min(grid.trials, self.quick_trials) if quick else grid.trials)
             for grid in self.grids
         )
+
+
+class TrackTable(Table, frozen=True, kw_only=True):
+    """`[track]`."""
+
+    schema: Literal["apo-bench/track/1"]
+    title: Text
+    overall: bool = True
+    quick_trials: Annotated[int, Meta(ge=1)] = 1
+    # msgspec 0.22 frees the pattern of `Text` twice where it is one of several types, so one name is a plain `str`.
+    arms: str | Annotated[tuple[Text, ...], Meta(min_length=1)] = TrialConfig.arm
 
 
 def seen_by(track: Track, estimator: str) -> Track:
@@ -91,14 +103,10 @@ def read_track(given: str | Path) -> Track:
         require(text in track_names(), unknown("track", text, track_names()) + " Or give a track file (.toml).")
         given = folder("scenarios") / "tracks" / f"{text}.toml"
     path = Path(given)
-    top = read_toml(path, "track file")
-    top.require(isinstance(top.value, dict) and TABLE in top.value, f"a table [{TABLE}] is needed")
-    top.require("methods" not in top.value, "no methods are needed, they are those who enter")
-    said = top.child(top.value[TABLE], TABLE).fields_of(SCHEMA, ("title",), ("overall", "quick_trials", "arms"))
-    quick = said["quick_trials"].integer() if "quick_trials" in said else 1
-    require(quick >= 1, f"{path}, {TABLE}, quick_trials: a whole number from 1 is needed, {quick} was given.")
-    arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialConfig.arm]
-    require(arms, f"{path}, {TABLE}, arms: at least one is needed; leave the key out for the usual one.")
+    top = read_plain(path, "track file")
+    require(TABLE in top, f"{path}: a table [{TABLE}] is needed.")
+    require("method" not in top, f"{path}, method: a track has no method, its entrants are; remove the key.")
+    table = convert_typed(top[TABLE], TrackTable, f"{path}, {TABLE}")
     grids = read_sweep(path, besides=(TABLE,))
     require(
         len({grid.seed for grid in grids}) == 1,
@@ -106,10 +114,10 @@ def read_track(given: str | Path) -> Track:
     )
     return Track(
         name=path.stem,
-        title=said["title"].text(),
-        overall=said["overall"].flag() if "overall" in said else True,
-        quick_trials=quick,
-        arms=tuple(arms),
+        title=table.title,
+        overall=table.overall,
+        quick_trials=table.quick_trials,
+        arms=(table.arms,) if isinstance(table.arms, str) else table.arms,
         hash=hashlib.sha256(read_bytes(path, "track file")).hexdigest()[:_HEX],
         grids=grids,
     )

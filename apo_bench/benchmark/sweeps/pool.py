@@ -23,10 +23,10 @@ from apo_bench.benchmark.sweeps.stopping import stoppable
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, environment
-from apo_bench.names import OwnModules, folder_of_own_modules
+from apo_bench.names import add_own_modules, folder_of_own_modules
 from apo_bench.records import TrialRecord
-from apo_bench.trial.outcome_columns import lost
-from apo_bench.trial.request import Request, checked_request, lost_request, run_request
+from apo_bench.trial.endings import record_lost_trial
+from apo_bench.trial.request import Request, checked_request, record_lost_request, run_request
 
 Emit = Callable[[TrialRecord, Timing], None]
 """Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
@@ -103,7 +103,7 @@ def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: 
         if len(batch) > 1:
             return [(trial,) for trial in batch]
         (trial,) = batch
-        row = lost(trial, inputs.content[trial.scenario], _code_of(error))
+        row = record_lost_trial(trial, inputs.content[trial.scenario], _code_of(error))
         emit(row, timing(row, None, None, None, {"worker": getattr(error, "pid", None)}))
         return []
 
@@ -123,7 +123,7 @@ def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
             row: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
             return row
         except (ProcessExpired, TimeoutError) as error:
-            return lost_request(request, settings, scenario, _code_of(error))
+            return record_lost_request(request, settings, scenario, _code_of(error))
 
 
 def prepare_process(folder: str) -> None:
@@ -135,8 +135,7 @@ def prepare_process(folder: str) -> None:
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     os.environ.pop(SAFE_PATH)
-    if folder:
-        sys.meta_path.append(OwnModules(folder))
+    add_own_modules(folder)
 
 
 def _start(pool: ProcessPool) -> None:

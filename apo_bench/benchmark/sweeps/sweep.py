@@ -28,11 +28,11 @@ from apo_bench.records import (
     with_simulated,
 )
 from apo_bench.records.run.run_file import run_record
-from apo_bench.records.run.run_folder import RunFolder
+from apo_bench.records.run.run_folder import RunFolder, read_records
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
-from apo_bench.trial.fingerprint import code_files, config_hash, content_hash, versions
+from apo_bench.trial.fingerprint import config_hash, content_hash, git_revision, versions
 from apo_bench.trial.inputs import content_pieces, noise_content, own_content
 
 _LARGEST_WORKERS = 256
@@ -94,12 +94,12 @@ def run_sweep(
     run = run_record(
         described(grids, loaded),
         _content(grids, loaded, arm.files),
-        code_files(),
         inputs.versions,
         {loaded[source].name: source for source in loaded if not is_named(source)},
         command,
         secret_seed,
         Limits(None if here else limit_s),
+        git_revision(),
     )
     with stoppable(), RunFolder(Path(out), run) as store:
         batches = list(_left(units(grids, loaded, secret_seed), loaded, inputs, store))
@@ -123,7 +123,7 @@ def run_sweep(
                 names = (*_names(grids, "method"), *_names(grids, "noise"), *_names(grids, "contact_source"), arm_name)
                 files = travelling_files(loaded, arm.files, names)
                 run_on_cluster(batches, inputs, workers, limit_s, emit, address, files)
-        return store.rows()
+        return read_records(out)
 
 
 def _left(
@@ -143,7 +143,7 @@ def _left(
             require(
                 found is None or found == hashes[cell],
                 f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
-                f"{trial.seed}, that was made with other code or settings; choose another folder.",
+                f"{trial.seed}, that was made with other files, versions or settings; choose another folder.",
             )
         for first in range(0, len(left), BATCH):
             yield tuple(left[first : first + BATCH])

@@ -16,10 +16,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
+from msgspec import UNSET
+
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
-from apo_bench.errors import InputError, require
-from apo_bench.io import JsonNode, read_toml
+from apo_bench.errors import InputError
+from apo_bench.io import Positive, Table, convert_typed, read_plain
 from apo_bench.records import SETTINGS, in_python
 
 _SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
@@ -27,6 +30,20 @@ _SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
 _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
 SWEEP_KEYS = (*_SEVERAL, "trials", "seed")
+_VALUES = [(key, Any, UNSET) for key in SWEEP_KEYS]
+AlsoTable = msgspec.defstruct("AlsoTable", _VALUES, bases=(Table,), kw_only=True)
+"""`[[also]]`: a further grid."""
+SweepTable = msgspec.defstruct(
+    "SweepTable",
+    [
+        *(("scenario", Any) if key == "scenario" else value for key, value in zip(SWEEP_KEYS, _VALUES, strict=True)),
+        *((key, Any if info.is_text else Positive, UNSET) for key, info in _ALONE.items()),
+        ("also", list[AlsoTable], []),  # type: ignore[valid-type]
+    ],
+    bases=(Table,),
+    kw_only=True,
+)
+"""A whole file."""
 
 
 def is_sweep_file(text: str) -> bool:
@@ -37,7 +54,7 @@ def is_sweep_file(text: str) -> bool:
     """
     if not text.lower().endswith(".toml"):
         return False
-    keys = read_toml(text, "sweep or scenario file").value
+    keys = read_plain(text, "sweep or scenario file")
     return "scenario" in keys or not {"parts", "operations"} & set(keys)
 
 
@@ -54,22 +71,13 @@ def read_sweep(
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenario",), (*SWEEP_KEYS[1:], *_ALONE, *besides, "also"))
-    tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
-    first = {key: _value(key, node) for key, node in top.items() if key not in ("also", *besides)}
-    grids = {str(path): first} | {
-        f"{path}, also {i}": first | {key: _value(key, node) for key, node in table.items()}
-        for i, table in enumerate(tables, start=1)
-    }
+    keys = {key: value for key, value in read_plain(path, "sweep file").items() if key not in besides}
+    top: Any = convert_typed(keys, SweepTable, str(path))
+    first = _values(top)
+    grids = {str(path): first}
+    for i, table in enumerate(top.also, start=1):
+        grids[f"{path}, also {i}"] = first | _values(table)
     return tuple(_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
-
-
-def _tables(node: JsonNode) -> Sequence[JsonNode]:
-    require(
-        isinstance(node.value, list) and all(isinstance(entry, dict) for entry in node.value),
-        f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.",
-    )
-    return node.items("also")
 
 
 def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
@@ -80,10 +88,13 @@ def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
         raise InputError(f"{name}: {error}") from error
 
 
-def _value(key: str, node: JsonNode) -> Any:
-    """The values of a key."""
-    if key not in _SEVERAL:
-        return node.value if key not in _ALONE or _ALONE[key].is_text else node.number(0.0, above=True)
-    if not isinstance(node.value, list):
-        return (node.value,)
-    return tuple(tuple(entry) if isinstance(entry, list) else entry for entry in node.value)
+def _values(table: msgspec.Struct) -> dict[str, Any]:
+    """The values of the keys that a table has."""
+    stated = {key: value for key, value in msgspec.structs.asdict(table).items() if value is not UNSET}
+    return {key: _several(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"}
+
+
+def _several(value: Any) -> tuple[Any, ...]:
+    """One value or several."""
+    entries = value if isinstance(value, list) else (value,)
+    return tuple(tuple(entry) if isinstance(entry, list) else entry for entry in entries)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.scenario import Scenario, is_named
-from apo_bench.scenario.parts import part_files_of
+from apo_bench.scenario.parts import read_part
 from apo_bench.trial.inputs import own_files
 
 
@@ -27,7 +27,7 @@ def travelling_files(
         if not is_named(source):
             files.append(Path(source))
             for part in scenario.part_files.values():
-                files.extend(part_files_of(part))
+                files.extend(read_part(part).files)
     for name in names:
         noise = noise_path(name)
         files.extend(own_files(name) if noise is None else (noise,))

@@ -12,8 +12,8 @@ from apo_bench.records import KEY, TrialConfig, TrialRecord, record_key
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, versions
+from apo_bench.trial.run import record_trial
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
-from apo_bench.trial.trial import trial_row
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
@@ -57,7 +57,7 @@ class Worker:
         """Run the trials of a batch in their order; the demonstration and the beginnings of replays are shared.
 
         Raises:
-            InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
+            InputError: The request cannot be honoured, or there are other files here than where the sweep was started.
         """
         cache = ReplayCache()
         simulated = None
@@ -67,7 +67,7 @@ class Worker:
             compiled = time.perf_counter()
             simulated = simulated or demonstration_of(spec, scene)
             shown = time.perf_counter()
-            row = trial_row(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
+            row = record_trial(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
             ended = time.perf_counter()
             yield row, timing(row, compiled - start, shown - compiled, ended - shown, self._name)
 
@@ -77,7 +77,7 @@ class Worker:
             scene = scene_of(spec)
             require(
                 content_hash(scene.scenario, spec.scenario, scene.arm.files) == self._inputs.content[spec.scenario],
-                f"a worker on '{platform.node()}' has other code or other files for '{spec.scenario}' than the process "
+                f"a worker on '{platform.node()}' has other files for '{spec.scenario}' than the process "
                 "that started the sweep; install the same everywhere, or start the same command again if a file was "
                 "changed.",
             )

@@ -2,7 +2,8 @@
 
 from apo_bench.assembly import Correction, Observation, largest
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.track import candidates, solve_own_contacts
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Equations, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.status import TWIST_UNITS, as_it_ends
+from apo_bench.correction.checks.as_given import TWIST_UNITS, as_it_ends
 from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array

@@ -1,22 +1,11 @@
 """Tracking (Section 4.2): correct after each observed operation, and reach back only as far as it takes.
 
-The robot has done operations 1 .. n-1 by the goals in force when it sees the n-th. If the contacts that this one makes
-do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do; then the robot takes the work apart
-back to the oldest of them and builds it again. The result is a schedule of do and undo steps.
-
-Which motion parameters to adjust (Section 3.3.2): from arcs that fail to all that hangs together with them.
-
-An arc of the relation graph is all contacts that one operation makes between one pair of parts. It joins the motion
-parameters in the ODLs that its two parts had when it was made; so it does after it has disappeared. A stable object
-has no ODL, nor has a part that was never moved: nothing is connected through them.
-
-Solve a goal for the contacts of its own operation alone.
-
-A goal that is no candidate is executed all the same, and a little wrong it does harm: a fixture put down tilted stays
-wedged in the fingers that let go of it.
+The robot has done operations 1 .. n-1 by the poses in force when it observes the n-th. If the contacts that this one
+makes do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do; then the robot takes the work
+apart back to the oldest of them and builds it again. The result is a schedule of do and undo steps.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import final
 
@@ -24,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import (
-    Assembly,
     Correction,
     Equations,
     Iterate,
@@ -34,52 +22,11 @@ from apo_bench.assembly import (
     largest,
 )
 from apo_bench.assembly.equations import equations
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import Solution, solve_newton
 from apo_bench.geometry import Array
-
-
-def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) -> Array:
-    """The goals (n, 4, 4) with that of operation k solved for what it makes, unless that opens a contact that held.
-
-    Args:
-        system: All equations that the goal has to respect, those of other operations too.
-        gap_m: Largest |e| at which a contact holds, [m].
-    """
-    solution = solve_newton(system.among(system.made == k), goals, (k,))
-    held = system.gaps(goals) <= gap_m
-    holds = system.gaps(solution.goals) <= gap_m
-    return solution.goals if solution.finite and (holds | ~held).all() else goals
-
-
-def candidates(assembly: Assembly, failing: NDArray[np.bool_]) -> tuple[int, ...]:
-    """The operations whose motion parameters may have to change, the most recent first; none if nothing fails.
-
-    Args:
-        failing: (c,), in the order of `assembly.relations()`: contacts with a residual above the threshold.
-    """
-    arcs = _arcs(assembly)
-    chosen = frozenset[int]().union(*(arc for arc, fails in zip(arcs, failing, strict=True) if fails))
-    return tuple(sorted(_connected(chosen, arcs), reverse=True))
-
-
-def _connected(chosen: frozenset[int], graph: Sequence[frozenset[int]]) -> frozenset[int]:
-    """With everything that is joined to it, however far away."""
-    while True:
-        grown = chosen.union(*(arc for arc in graph if arc & chosen))
-        if grown == chosen:
-            return chosen
-        chosen = grown
-
-
-def _arcs(assembly: Assembly) -> list[frozenset[int]]:
-    """The operations in the ODLs of both ends of each contact, of the time it was made."""
-    history = assembly.odls()
-    return [
-        frozenset(term.operation for end in relation.contact for term in history[relation.made].get(end.part, ()))
-        for relation in assembly.relations()
-    ]
-
 
 _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
 """Candidates, most recent first -> the sets of motion parameters to try, in order."""

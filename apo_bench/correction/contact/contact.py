@@ -1,16 +1,10 @@
-"""The corrector `contact`: the most likely consistent goals, tested against the stated noise.
+"""The corrector `contact`: the most likely consistent poses, tested against the stated noise.
 
 Every motion parameter is free; what the contacts do not ask for is not changed, since any change costs likelihood.
-
-Which relation to suspect if the test of a correction fails.
-
-Everything fits once a relation that is wrong is left out, so the relations are ranked by how well the rest fits without
-them. More than one may do: they form the ambiguity set, and nothing that was seen tells them apart.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 from typing import Literal, final
 
 import numpy as np
@@ -18,71 +12,21 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import (
-    Assembly,
     Consistency,
-    Contact,
     Correction,
     Iterate,
     Observation,
     Suspect,
-    lowered_together,
+    project_observations,
 )
-from apo_bench.correction.checks.status import TEST_LEVEL, opposing, refused_correction, status_sentence
+from apo_bench.correction.checks.chi_square import TEST_LEVEL
+from apo_bench.correction.checks.status import opposing, refused_correction, status_sentence
 from apo_bench.correction.contact.problem import Problem, problem_of
-from apo_bench.correction.contact.solved import Solved, pull, solve, tested
+from apo_bench.correction.contact.solved import Solved, solve
 from apo_bench.correction.contact.starts import best_start, turned_words
+from apo_bench.correction.contact.suspects import contact_suspects, suspects
 from apo_bench.correction.solvers import LARGEST_DENSE
 from apo_bench.errors import require
-
-MOST_SUSPECTS = 64
-"""Relations that are left out in turn; of more, those that pull hardest."""
-
-
-def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
-    """Every relation that has contacts that are `kept`, (c,), left out in turn; the most suspect first.
-
-    Of more relations than `MOST_SUSPECTS` only those that pull hardest are tried.
-    """
-    arcs = problem.observation.assembly.arcs()
-    considered = [i for i, arc in enumerate(arcs) if kept[list(arc)].any()]
-    if len(considered) > MOST_SUSPECTS:
-        size = pull(problem, kept)
-        considered = sorted(sorted(considered, key=lambda i: -size[list(arcs[i])].sum())[:MOST_SUSPECTS])
-    return _ranked(problem, kept, [(f"R{i + 1}", arcs[i]) for i in considered])
-
-
-def contact_suspects(problem: Problem, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
-    """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
-    single = contacts_of(problem.observation.assembly, relation)
-    return _ranked(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
-
-
-def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]:
-    """The contacts of one relation, `R3`, by their names, `R3: stick.py on castle1.spy`: numbers in `relations()`."""
-    relations = assembly.relations()
-    together = dict[Contact, tuple[int, ...]]()
-    for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
-        contact = assembly.given(relations[j].contact)
-        together[contact] = (*together.get(contact, ()), j)
-    return {f"{relation}: {contact}": group for contact, group in together.items()}
-
-
-def _ranked(
-    problem: Problem, kept: NDArray[np.bool_], groups: Sequence[tuple[str, tuple[int, ...]]]
-) -> tuple[Suspect, ...]:
-    """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
-    relations = problem.observation.assembly.relations()
-    ranked = list[Suspect]()
-    for name, group in groups:
-        rest = kept.copy()
-        rest[list(group)] = False
-        test = tested(problem, rest)
-        contacts = tuple(dict.fromkeys(problem.observation.assembly.given(relations[j].contact) for j in group))
-        numbers = test.chi_square, test.freedom, test.p_value
-        ranked.append(Suspect(name, contacts, relations[group[0]].made, *numbers))
-    # A chi-square of f degrees of freedom has mean f and variance 2 f.
-    return tuple(sorted(ranked, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))
-
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3
@@ -135,7 +79,7 @@ class ContactCorrector:
             InputError: As of one.
         """
         # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
-        observations = lowered_together(observations)
+        observations = project_observations(observations)
         results = [None if all(each.observed.tolist()) else refused_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(

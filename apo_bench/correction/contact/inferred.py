@@ -103,7 +103,7 @@ def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
     """The faces of every contact, in the order of `relations()`; None of contacts of sheets that add nothing.
 
     Args:
-        assembly: As `lowered` makes it.
+        assembly: As `project_round_faces` makes it.
     """
     ends_of_each = list[Ends | None]()
     seen_contacts = set[tuple[int, Contact]]()
@@ -151,13 +151,13 @@ def _conditions(assembly: Assembly, start: Array, goals: Array, k: int, left: Co
         j = letters.index(p + k)
         before = pose.inverse(product(word[:j], poses))
         behind = product(word[j + 1 :], poses)
-        inverted = word[j].inverse
+        inverse = word[j].inverse
         a = before[:3, :3] @ ends.directions[0], pose.apply(before, ends.middles[0][None])[0]
         b = behind[:3, :3] @ ends.directions[1], pose.apply(behind, ends.middles[1][None])[0]
-        (own, at), (other, there) = (a, b) if inverted else (b, a)
-        beside = behind[:3, :3] if inverted else before[:3, :3]
+        (own, at), (other, there) = (a, b) if inverse else (b, a)
+        beside = behind[:3, :3] if inverse else before[:3, :3]
         way = -other if ends.lie == "opposite" else other
-        conditions.append(_Condition(own, at, way, there, beside, ends, inverted))
+        conditions.append(_Condition(own, at, way, there, beside, ends, inverse))
     return conditions
 
 

@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import TEST_LEVEL, fit_deviation
+from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
     CompactEquations,
     Inequalities,
     Kernels,
-    LaidContacts,
     NearestGoals,
+    ProjectedContacts,
     batch_goals,
     bounded,
     compact_equations,
     correction_to,
     fit_covariance,
-    laid_contacts,
     noise_factor,
+    project_vertices,
     scales,
 )
 from apo_bench.correction.solvers.kernels import kernels
@@ -63,7 +63,7 @@ class Problem:
     """(b, n, 4, 4), what was seen."""
     L: Array
     """(b, n, 6, 6), or (b, n, 6, 6 n) where operations share errors."""
-    laid: LaidContacts
+    laid: ProjectedContacts
     """The equations of every contact, planes shifted to where they are asked to be."""
     demands: _Demands
     inequalities: tuple[Inequalities, ...]
@@ -166,7 +166,7 @@ def problem_of(
     demands = _demands(assembly, first.play_m)
     by = kernels() if compiled else None
     there = goals if at is None else at
-    laid = laid_contacts(assembly, start, demands.plane, there)
+    laid = project_vertices(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
     if not demands.all_exact:
         systems = (equations(assembly, first.start, T) for T in there)

@@ -1,17 +1,4 @@
-"""The nearest goals by some of the contacts, with all that `contact` says of them: gaps, rank, covariance, test.
-
-The squared length of a correction in standard deviations, chi-square, and its test.
-
-Where contacts contradict each other or parts fit with play, equations may be off: what they are off by, in standard
-deviations of its own, counts beside z.
-
-The test and the regions of a correction where errors have tails: by draws of the noise that is stated.
-
-Near the solution everything is linear: the squared length of a correction is that of what the observation is off by in
-the directions that contacts fix, and the goals are off by the rest. So both are drawn with the noise, and numbers that
-were seen are compared with numbers that were drawn (Monte Carlo p-value; Davison and Hinkley, "Bootstrap Methods and
-their Application", 1997, Section 4.2).
-"""
+"""The nearest poses by some of the contacts, with all that `contact` states of them: gaps, rank, covariance, test."""
 
 from collections.abc import Sequence
 from math import cos, radians
@@ -20,118 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, Observation, joint_covariance, largest
-from apo_bench.correction.checks.status import CONTRADICTION_M, ROUNDING, p_value, softened_chi_square
+from apo_bench.assembly import Consistency, largest
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value
 from apo_bench.correction.contact.problem import Problem
+from apo_bench.correction.contact.squared_length import chi_square_test, chi_squares, relaxed_chi_square
 from apo_bench.correction.solvers import (
     NearestGoals,
     active_rank,
-    coordinates_of,
-    jacobian_rank,
     marginals,
     nearest_between,
     projections,
 )
 from apo_bench.geometry import Array
-
-DRAWS = 2000
-
-
-def drawn_chi_squares(
-    observation: Observation, L: Array, Jt: Array, S: Array | None, left_out: tuple[int, ...] = ()
-) -> Array:
-    """Squared lengths of corrections of errors that are drawn, (DRAWS,), sorted.
-
-    Args:
-        L: As of `noise_factor`.
-        Jt: (6 n, 3 c), the transposed derivative of the equations by z, at a solution.
-        S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
-        left_out: Operations whose goals are inferred, so that they agree with their contacts.
-    """
-    r = _drawn(observation, L, left_out) @ Jt
-    # As `softened_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
-    A = Jt.T @ Jt
-    if S is not None:
-        w, V = np.linalg.eigh(S)
-        play = np.random.default_rng(DRAWS).standard_normal(r.shape)
-        r = r + play @ (V * np.sqrt(np.maximum(w, 0.0))).T
-        A = A + S
-    A = A + ROUNDING * A.diagonal().max(initial=1e-300) * np.eye(len(A))
-    return np.sort((r * np.linalg.solve(A, r.T).T).sum(axis=1))
-
-
-def drawn_p_value(drawn: Array, chi_square: float) -> float:
-    """The part of drawn squared lengths, sorted, that are not less; never 0, since one more might be."""
-    above = len(drawn) - int(np.searchsorted(drawn, chi_square))
-    return (1.0 + above) / (1.0 + len(drawn))
-
-
-def drawn_radius(observation: Observation, L: Array, free: Array, level: float) -> float:
-    """The squared length within which a part `level` of errors in the free directions are, (6 n, f), of z."""
-    return float(np.quantile(np.square(_drawn(observation, L) @ free).sum(axis=1), level))
-
-
-def _drawn(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) -> Array:
-    """z of errors, (DRAWS, 6 n); of operations that are left out of none."""
-    if observation.tails is None:
-        raise ValueError("the observation states no tails")
-    joint = joint_covariance(observation.poses, observation.covariance, observation.shared)
-    twists = observation.tails.draws(joint, DRAWS)
-    twists[:, list(left_out)] = 0.0
-    return coordinates_of(L, twists)
-
-
-def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[Array, NDArray[np.bool_]]:
-    """Squared lengths of corrections, (b,), and whether those are what the test asks for, (b,), as they stand.
-
-    They are if the contacts hold and what play leaves needs no further solution; else it is `relaxed_chi_square`.
-    """
-    holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= CONTRADICTION_M)
-    S = problem.play_covariance(chosen)
-    if S is not None:
-        Jt = nearest.Jt if isinstance(nearest.Jt, np.ndarray) else nearest.Jt[0].toarray()[None]
-        return softened_chi_square(nearest.z, Jt, S), holds
-    if problem.demands.slack_m is not None and problem.slack(chosen).any():
-        holds[:] = False
-    return np.square(nearest.z).sum(axis=1), holds
-
-
-def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[float, int]:
-    """The squared length of one correction and its degrees of freedom, the rank.
-
-    Where contacts contradict each other, or fit with play, the solver runs once more, with a standard deviation for
-    each equation, and the squares of what is left of the equations, in that unit, are added.
-    """
-    degrees = jacobian_rank(nearest.Jt[0])
-    if not nearest.finite[0]:
-        return np.inf, degrees
-    (chi_square,), (simple,) = chi_squares(problem, chosen, nearest)
-    if simple:
-        return float(chi_square), degrees
-    slack_m = problem.slack(chosen)
-    soft = (
-        slack_m if nearest.at_rest[0] and largest(nearest.e) <= CONTRADICTION_M else np.hypot(slack_m, CONTRADICTION_M)
-    )
-    relaxed = problem.nearest(chosen, soft)
-    softened = soft > 0.0
-    over = relaxed.e[0, softened] / soft[softened]
-    return float(relaxed.z[0] @ relaxed.z[0] + over @ over), degrees
-
-
-def chi_square_test(
-    problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals, chi_square: float, degrees: int
-) -> Consistency:
-    """The test of one squared length with its degrees of freedom, by the chi-square distribution.
-
-    Where errors have tails it is by draws, of which only dense matrices are made.
-    """
-    p = p_value(chi_square, degrees)
-    tails = problem.observation.tails
-    if tails is not None and degrees and np.isfinite(chi_square) and isinstance(nearest.Jt, np.ndarray):
-        drawn = drawn_chi_squares(problem.observation, problem.L[0], nearest.Jt[0], problem.play_covariance(chosen))
-        p = drawn_p_value(drawn, chi_square)
-    return Consistency(chi_square, degrees, p, problem.level)
-
 
 FAR_DEG = 45.0
 """A goal that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none
@@ -221,7 +108,7 @@ def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, ch
     gaps = problem.gaps(goals, forms)
     worst_m = gaps.max(axis=1, initial=0.0).tolist()
     kept_m = worst_m if all_kept else gaps[:, kept].max(axis=1, initial=0.0).tolist()
-    away = np.any(problem.laid.looking_away(forms), axis=1).tolist()
+    away = np.any(problem.laid.faces_away(forms), axis=1).tolist()
     far = turned_far(problem.goals, goals).tolist()
     at_rest = nearest.at_rest.tolist()
     finite = nearest.finite.tolist()

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly import largest, looking_away
+from apo_bench.assembly import faces_away, largest
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import Problem, problem_of
@@ -20,8 +20,8 @@ from apo_bench.correction.solvers import (
     LARGEST_POSTERIOR,
     correction_to,
     descended,
-    laid_contacts,
     nearest_goals,
+    project_vertices,
     scales,
 )
 from apo_bench.geometry import Array, symmetries
@@ -76,7 +76,7 @@ def _holds(problem: Problem, solved: Solved) -> bool:
 
 def _faces_oppose(problem: Problem, *goals: Array) -> bool:
     """Whether the faces of every contact look at each other, at each of some goals."""
-    return not looking_away(problem.observation.assembly, problem.observation.start, np.array(goals)).any()
+    return not faces_away(problem.observation.assembly, problem.observation.start, np.array(goals)).any()
 
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
@@ -101,7 +101,7 @@ def _starts(problem: Problem, first: Solved) -> Array:
             goals = np.array(observation.poses)
             goals[k] = goals[k] @ g
             turned.append(goals)
-    away = looking_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
+    away = faces_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
     return np.array([*starts, *(goals for goals, count in zip(turned, away, strict=True) if count < away[0])])
 
 
@@ -111,7 +111,7 @@ def _doubted(problem: Problem, first: Solved) -> Collection[int]:
     n = len(problem.observation.poses)
     if n <= _MOST:
         return range(n)
-    bad = looking_away(observation.assembly, observation.start, first.goals)
+    bad = faces_away(observation.assembly, observation.start, first.goals)
     bad |= ~(first.gaps <= observation.gap_m)
     letters = pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
@@ -125,7 +125,7 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     (b, n, *_) = starts.shape
     L = scales(observation.covariance)
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
-    laid = laid_contacts(observation.assembly, start, problem.demands.plane, starts)
+    laid = project_vertices(observation.assembly, start, problem.demands.plane, starts)
     system = laid.system.among(problem.demands.exact)
     z = correction_to(observation.poses, L, starts)
     if 6 * n <= LARGEST_DENSE:
@@ -138,7 +138,7 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     rest = np.concatenate([np.atleast_1d(result.at_rest) for result in results])
     e = np.concatenate([np.atleast_2d(result.e) for result in results])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
-    holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
+    holds &= ~faces_away(observation.assembly, observation.start, goals).any(axis=1)
     # The nearest first, since only the nearest that holds is of use.
     z = correction_to(observation.poses, problem.L[0], goals[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import p_value
+from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
 from apo_bench.correction.robust.hypotheses import (

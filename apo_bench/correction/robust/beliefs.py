@@ -1,15 +1,9 @@
-"""What may be believed of one view, and how likely that is before contacts are asked.
+"""What may be assumed of one view, and how likely that is before contacts count.
 
 A view is an inlier, seen with the stated noise; broad, seen with some times that; shifted, too near or too far;
 flipped, turned as a part that nearly looks the same after that turn may be; swapped with that of another operation;
 displaced together with views of neighbours; stale, where the part was before; or gross, anywhere. The last two say
-nothing of the goal.
-
-What all hypotheses say together of where goals may be.
-
-Goals are those of the likeliest: a mean of goals that satisfy contacts satisfies none, and a mean of a part and the
-same part turned round is nowhere. Hypotheses that lead to nearly the same goals are one mode of the mixture, and the
-covariance is that of the mode. Those that lead elsewhere keep goals and covariance of their own.
+nothing of the pose.
 """
 
 from collections.abc import Sequence
@@ -18,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import betaln
 
-from apo_bench.assembly import Hypothesis, OutlierModel
-from apo_bench.geometry import Array, frozen, pose, right_jacobian
+from apo_bench.assembly import OutlierModel
+from apo_bench.geometry import Array, frozen, pose
 
 INLIER = 0
 BROAD = 1
@@ -173,38 +167,3 @@ def together(states: States, model: OutlierModel) -> float:
     if DISPLACED in first:
         total -= 2.0 * float(np.log(model.view / (1.0 - model.view) / max(1, n * (n - 1) // 2)))
     return total
-
-
-_APART = 22.5
-"""Squared difference of two goals, in standard deviations of both, beyond which hypotheses are different modes: with
-six degrees of freedom one in a thousand is larger."""
-_FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
-"""(6, 6): goals are not told apart by less, [m, rad]."""
-
-
-def mode_covariance(hypotheses: Sequence[Hypothesis]) -> Array | None:
-    """The covariance of the first hypothesis and of those of its mode about its goals, (n, 6, 6), [m, rad].
-
-    The second moment of a mixture: of each hypothesis its covariance and the square of how far its goals are off, by
-    their weights.
-
-    Returns:
-        None if the first has no covariance.
-    """
-    first = hypotheses[0]
-    if first.covariance is None:
-        return None
-    total = 0.0
-    second = np.zeros(first.covariance.shape)
-    for one in hypotheses:
-        if one.covariance is None:
-            continue
-        off = pose.log(pose.inverse(first.poses) @ one.poses)
-        both = first.covariance + one.covariance + _FINE
-        if (np.einsum("ki,ki->k", off, np.linalg.solve(both, off[..., None])[..., 0]) > _APART).any():
-            continue
-        # T_one exp(x) = T_first exp(off) exp(x) is T_first exp(off + A x), with A the inverse of J_r(off).
-        A = np.linalg.inv(right_jacobian(off))
-        second += one.weight * (A @ one.covariance @ np.swapaxes(A, 1, 2) + off[:, :, None] * off[:, None, :])
-        total += one.weight
-    return np.asarray(second / total)

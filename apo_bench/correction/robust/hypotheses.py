@@ -15,23 +15,14 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, looking_away
+from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, faces_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import CONTRADICTION_M, fit_deviation, p_value
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
+from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import problem_of, seen_system
-from apo_bench.correction.contact.solved import drawn_chi_squares, drawn_p_value
-from apo_bench.correction.robust.beliefs import (
-    DISPLACED,
-    INLIER,
-    ROOM,
-    VIEW,
-    State,
-    States,
-    says_nothing,
-    together,
-)
+from apo_bench.correction.robust.beliefs import DISPLACED, INLIER, ROOM, VIEW, State, States, says_nothing, together
 from apo_bench.correction.robust.noise_scale import (
     LEAST,
     likeliest_scale,
@@ -175,7 +166,7 @@ class SolvedHypothesis:
     def stands_at(self, goals: Array) -> bool:
         """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
         observation = self.observation
-        away = looking_away(observation.assembly, observation.start, goals)
+        away = faces_away(observation.assembly, observation.start, goals)
         return not (away & observation.assembly.without(self.dropped)).any()
 
     def _faces_oppose(self) -> bool:

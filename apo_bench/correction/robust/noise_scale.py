@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly import Consistency, Observation
-from apo_bench.correction.checks.status import p_value
+from apo_bench.correction.checks.chi_square import p_value
 
 SPREAD = 1.0
 """Standard deviation of the logarithm of s: twice as noisy is nothing special."""

@@ -9,23 +9,23 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap, lowered_together
-from apo_bench.correction.checks.status import TEST_LEVEL, refused_correction
+from apo_bench.assembly import (
+    Correction,
+    Hypothesis,
+    Observation,
+    OutlierModel,
+    Reobserver,
+    largest_gap,
+    project_observations,
+)
+from apo_bench.correction.checks.chi_square import TEST_LEVEL
+from apo_bench.correction.checks.status import refused_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import inferred_goals
-from apo_bench.correction.robust.beliefs import (
-    BROAD,
-    DISPLACED,
-    FLIPPED,
-    GROSS,
-    INLIER,
-    SHIFTED,
-    STALE,
-    States,
-    mode_covariance,
-)
+from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
+from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import looked_again, views_of
@@ -65,20 +65,20 @@ class RobustCorrector:
         Raises:
             InputError: The covariance of an operation is not positive definite.
         """
-        return self.looking(observation, None)
+        return self.correct_and_reobserve(observation, None)
 
     def together(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct observations of one assembly with the same start poses and play: at once those that pass the test."""
-        observations = lowered_together(observations)
+        observations = project_observations(observations)
         plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
         made: list[Correction | None] = [None] * len(observations)
         for i, correction in zip(plain, as_begun.together([observations[i] for i in plain]), strict=True):
             made[i] = self._believed(observations[i], correction)
         return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
 
-    def looking(self, observation: Observation, look: Look | None) -> Correction:
+    def correct_and_reobserve(self, observation: Observation, reobserve: Reobserver | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
-        if look is None and self._is_plain(observation):
+        if reobserve is None and self._is_plain(observation):
             correction = self._believed(observation, as_stated(observation))
             if correction is not None:
                 return correction
@@ -93,9 +93,9 @@ class RobustCorrector:
             best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
-            if look is None or not look.left or not doubted:
+            if reobserve is None or not reobserve.left or not doubted:
                 break
-            views = looked_again(views, look(doubted), observation, model)
+            views = looked_again(views, reobserve(doubted), observation, model)
             again += doubted
         if best is None:
             return contact_apply(observation) if observation.observed.all() else refused_correction(observation)

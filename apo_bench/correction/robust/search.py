@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.contact.contact import contacts_of
+from apo_bench.correction.contact.suspects import contacts_of
 from apo_bench.correction.robust.agreement import ContactAgreement, expected_badness
 from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
 from apo_bench.correction.robust.hypotheses import (

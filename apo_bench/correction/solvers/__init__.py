@@ -1,14 +1,7 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearised_by
-from apo_bench.correction.solvers.gauss_newton import (
-    LARGEST_DENSE,
-    SMALLEST,
-    NearestGoals,
-    batch_goals,
-    descended,
-    nearest_goals,
-)
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestGoals, batch_goals, nearest_goals
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,
@@ -19,7 +12,8 @@ from apo_bench.correction.solvers.inequalities import (
 )
 from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
-from apo_bench.correction.solvers.play import LaidContacts, fit_covariance, laid_contacts, plays
+from apo_bench.correction.solvers.newton_descent import descended
+from apo_bench.correction.solvers.play import fit_covariance, plays
 from apo_bench.correction.solvers.posterior import (
     LARGEST_POSTERIOR,
     RANK_CUT_OFF,
@@ -30,6 +24,7 @@ from apo_bench.correction.solvers.posterior import (
     projections,
     settled_basis,
 )
+from apo_bench.correction.solvers.projected_contacts import ProjectedContacts, project_vertices
 from apo_bench.correction.solvers.whitened import (
     Whitened,
     coordinates_of,
@@ -51,8 +46,8 @@ __all__ = (
     "Freedom",
     "Inequalities",
     "Kernels",
-    "LaidContacts",
     "NearestGoals",
+    "ProjectedContacts",
     "Solution",
     "Whitened",
     "active_rank",
@@ -66,7 +61,6 @@ __all__ = (
     "fit_covariance",
     "freedom_of",
     "jacobian_rank",
-    "laid_contacts",
     "least_step",
     "linearised_by",
     "marginals",
@@ -74,6 +68,7 @@ __all__ = (
     "nearest_goals",
     "noise_factor",
     "plays",
+    "project_vertices",
     "projections",
     "scales",
     "settled_basis",

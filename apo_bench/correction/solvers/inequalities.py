@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Equations, lowered
+from apo_bench.assembly import Assembly, Equations, project_round_faces
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import goals_at, shortest_z
@@ -77,7 +77,7 @@ def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequa
 
 def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
-    low, high = lowered(assembly).intervals(play_m).T
+    low, high = project_round_faces(assembly).intervals(play_m).T
     exact = low == high
     inequalities = bounded(system, exact, low, high)
     if exact.all() and not low.any():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.kernels import Kernels, owned
+from apo_bench.correction.solvers.kernels import Kernels, own
 from apo_bench.geometry import ADJOINTS, SERIES, Array, exp_and_jacobian
 
 SURE = 1e-6
@@ -79,16 +79,12 @@ class DenseStep:
         self.sizes = np.empty((3, b))
         self._kernels = kernels if L.shape[-1] == 6 else None
         if self._kernels is not None:
+            self._observed, self._L, self._soft2 = own(observed), own(L), own(self._soft2)
+            # What the kernels take, in the order of their parameters.
             points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
-            self._observed, self._L = owned(observed), owned(L)
-            self._soft2 = owned(self._soft2)
-            # What the kernels take; these are their names of it, in their order.
-            # words, matrices, plane, points
-            self._contacts = system.words.table, np.array(system.constants), owned(system.plane), owned(points)
+            self._contacts = system.words.table, np.array(system.constants), own(system.plane), own(points)
             width = system.words.letters.shape[1]
-            # small, behind, before
-            self._scratch = np.zeros((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
-            # R, y
+            self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
             self._factor = np.empty((m, m)), np.empty(m)
             self._forms = np.empty((b, len(system), 4))
 
@@ -103,17 +99,14 @@ class DenseStep:
     def linearise(self, z: Array, rows: Rows) -> None:
         # The kernel does what the lines below it do.
         if self._kernels is not None:
-            # In the order of its parameters: what is known, where to linearise, two tables, scratch, results.
             known = *self._contacts, self._observed, self._L, self._soft2
             results = self.T, self.B, self.e, self._J, self._forms, self.sizes
-            self._kernels.linearised(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
+            self._kernels.linearise(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
             return
         some = self._views(rows)
+        self.T[some], self.B[some] = goals_at(self._observed[some], self._L[some], z[some])
+        e, Jt = linearised_by(self._system.only(some), self.T[some], self.B[some])
         m = max(self.e.shape[1], 1)
-        T, B = goals_at(self._observed[some], self._L[some], z[some])
-        e, Jt = linearised_by(self._system.only(some), T, B)
-        self.T[some] = T
-        self.B[some] = B
         self.e[some] = e
         self._J[some] = np.swapaxes(Jt, 1, 2)
         self.sizes[0, some] = np.abs(e).max(axis=1, initial=0.0)
@@ -121,18 +114,12 @@ class DenseStep:
         self.sizes[2, some] = np.einsum("bij,bij->b", Jt, Jt) / m
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
-        # As above, by a Cholesky decomposition.
+        some = self._views(rows)
         if self._kernels is not None:
             step = np.empty((len(rows), z.shape[1]))
-            largest = np.empty(len(rows))
-            angles = np.empty(len(rows))
-            self._kernels.change(
-                self._J, self.e, z, self._L, mu, self._soft2, rows, *self._factor, step, largest, angles
-            )
-            return step, largest, angles
-        some = self._views(rows)
-        now = z[some]
-        step = shortest_z(self._J[some], self.e[some], now, mu[:, None] + self._soft2) - now
+            self._kernels.change(self._J, self.e, z, mu, self._soft2, rows, *self._factor, step)
+        else:
+            step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
         return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
 
     def _views(self, rows: Rows) -> Any:

@@ -4,27 +4,20 @@ Two parts that fit are off by one displacement, uniform within the play along ev
 that look opposite ways are off by the same amount. In a round hole it is anywhere in a disc. A part that is carried
 inside another one also shifts within their play until it is let go of, so its later contacts are off by where it lay in
 its carrier before, and by where it lies then: play adds up along what is carried.
-
-The contact equations of one assembly at goals that were seen: vertices laid onto the faces that they lie on.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import sqrt
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Contact, PartFace, Pattern
+from apo_bench.assembly import Assembly, Contact, PartFace
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.solvers.compact import CompactEquations, Words, moments
-from apo_bench.geometry import Array, frozen, pose, remembered
+from apo_bench.geometry import Array, frozen, remembered
 
 LARGEST_CORRELATED = 300
 """Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""
-
-
 _DISC = sqrt(3.0) / 2.0
 """A component of a point that is anywhere in a disc deviates by this part of one that is anywhere in an interval."""
 _Loose = Mapping[Contact, float]
@@ -146,86 +139,3 @@ def _fitting(assembly: Assembly, shift: _Shift, loose: _Loose) -> Array:
     known = _together(assembly, shift.part, shift.other, shift.made + 1, loose)
     normals = np.array([n for _, n, _ in known])
     return np.asarray(np.linalg.pinv(normals) @ normals) * max(size for _, _, size in known)
-
-
-_ONE = np.eye(4)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class LaidContacts:
-    """The equations of all contacts, and their vertices, laid at some goals."""
-
-    system: CompactEquations
-    """With points (*, c, 3, 4)."""
-    vertex: Array
-    """(*, m, 4), frame of the environment part, [m]."""
-    forms: Array
-    """(*, c, 4): as of `CompactEquations.forms`, at these goals."""
-    pattern: Pattern
-
-    def only(self, some: slice) -> "LaidContacts":
-        """Those of some of the observations."""
-        return LaidContacts(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
-
-    def gaps(self, forms: Array) -> Array:
-        """The largest |e| of each contact, (*, c), [m]."""
-        if not len(self.pattern.contact):
-            return np.zeros(forms.shape[:-1])
-        e = (forms.take(self.pattern.contact, axis=-2) * self.vertex).sum(axis=-1)
-        return np.asarray(np.maximum.reduceat(np.abs(e), self.pattern.begin[:-1], axis=-1))
-
-    def looking_away(self, forms: Array) -> NDArray[np.bool_]:
-        """Which contacts have faces that do not look at each other, (*, c), as `looking_away` has it."""
-        return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
-
-
-def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> LaidContacts:
-    """The equations of all contacts of an assembly, vertices where they are at the goals, (*, n, 4, 4).
-
-    Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
-    taken back by the word of their contact at the goals, and dropped onto its plane. That is one affine map for each
-    contact, which takes the three points that stand for the vertices along.
-
-    Args:
-        start: (p, 4, 4).
-        plane: (c, 4), shifted to where contacts are asked to be.
-    """
-    corners = _corners(assembly)
-    constants = corners.words.constants(start)
-    products = corners.words.products(constants, goals)
-    maps = np.where(corners.laid, corners.drops @ pose.inverse(products), _ONE)
-    vertex = (maps.take(corners.pattern.contact, axis=-3) @ corners.vertex)[..., 0]
-    points = corners.points @ np.swapaxes(maps, -1, -2)
-    forms = (plane[:, None] @ products)[..., 0, :]
-    return LaidContacts(CompactEquations(corners.words, constants, plane, points), vertex, forms, corners.pattern)
-
-
-class _Corners(NamedTuple):
-    """What the contacts of an assembly have in common, wherever its parts are."""
-
-    pattern: Pattern
-    words: Words
-    laid: NDArray[np.bool_]
-    """(c, 1, 1): as of the pattern."""
-    vertex: Array
-    """(m, 4, 1), frame of their own part, [m]."""
-    points: Array
-    """(c, 3, 4): what stands for the corners of each contact, in the frame of their own part."""
-    drops: Array
-    """(c, 4, 4): the maps v -> v - n (n v) that drop points onto the face of the environment."""
-
-
-@remembered
-def _corners(assembly: Assembly) -> _Corners:
-    known = pattern(assembly)
-    normal = np.array(known.onto)
-    normal[:, 3] = 0.0
-    return _Corners(
-        known,
-        Words(known.letters, known.inverse, len(assembly.solids), len(assembly)),
-        known.laid[:, None, None],
-        known.corners[..., None],
-        moments(known.corners[:, :3], known.contact, len(known.letters)),
-        np.asarray(_ONE - normal[:, :, None] * known.onto[:, None, :]),
-    )

@@ -19,11 +19,11 @@ from apo_bench.importers.assembly.touching import walls_without_play
 from apo_bench.io import read_bytes
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
-from apo_bench.simulation.arm_checks.arm_check import place_in_reach
+from apo_bench.simulation.arm_checks.placing import place_in_reach
 from apo_bench.simulation.arm_checks.plan_check import struck_by
 from apo_bench.simulation.execution import after_transfer, key_angles, moves
 from apo_bench.simulation.scene import Scene, build_scene
-from apo_bench.trial.trial import run_trial
+from apo_bench.trial.run import run_trial
 
 _ON_TABLE_M = 1e-4
 _STRUCK_M = 1e-4

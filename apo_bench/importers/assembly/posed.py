@@ -88,7 +88,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
-    """Return the same assembly, upright, its lowest point on the table, the middle of the box around it over the origin.
+    """Return the same assembly, upright, its lowest point on the table, its middle over the origin.
 
     Args:
         up: The axis of the poses that looks up, of `UPS`.

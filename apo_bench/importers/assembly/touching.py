@@ -64,9 +64,7 @@ def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float)
         if tight:
             sentences.append(tight)
         elif deep_m > DEEP_M:
-            sentences.append(
-                f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other; give them room"
-            )
+            sentences.append(f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other; give them room")
     return sentences
 
 

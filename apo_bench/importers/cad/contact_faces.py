@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straightened
+from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straighten
 from apo_bench.importers.cad.faces.fitting import ON_WALL
 from apo_bench.importers.cad.solids.raw_solid import RawSolid
 from apo_bench.importers.cad.solids.region import Region, square_to
@@ -47,7 +47,7 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
     offset = float(n @ region.point) * n
     rings = [ring @ flat + offset for ring in rings_of(area, 1.0)]
     drawn = [_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
-    outline, *holes = (straightened(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
+    outline, *holes = (straighten(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
     return Face(region.name, outline, tuple(holes))
 
 

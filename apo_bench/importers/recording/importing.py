@@ -19,7 +19,7 @@ from apo_bench.importers.recording.observed_operation import ObservedOperation, 
 from apo_bench.importers.recording.ordering import NoOrder, Stated
 from apo_bench.importers.recording.rest_intervals import find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.perception.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
+from apo_bench.perception.observation.models import UNSEEN_DEVIATION, floor_covariance, last_seen, with_shared
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -88,7 +88,7 @@ def import_recording(
         assembly=assembly,
         start=arrangement.start,
         poses=last_seen(assembly, arrangement.start, poses, observed),
-        covariance=floored(covariance + _adjustments(operations, assembly)),
+        covariance=floor_covariance(covariance + _adjustments(operations, assembly)),
         observed=observed,
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,

@@ -143,9 +143,9 @@ def _best_choices(
             rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
             raise NoOrder(
                 f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
-                f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on, and none "
-                "follows the others; check the ids in the objects file and that the log begins before the first part is "
-                "taken, or state --ends, or --unseen for operations that the log does not show."
+                f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on, and none of these "
+                "follows the others; check the ids in the objects file and that the log begins before the first part "
+                "is taken, or state --ends, or --unseen for operations that the log does not show."
             )
         choices = [each for ending in by_end.values() for each in _best_two(ending)]
     return _best_two(choices)

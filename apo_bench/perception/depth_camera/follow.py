@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
+from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turn_alike
 from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.perception.depth_camera.rays import RayCaster
@@ -88,12 +88,12 @@ def follow_demonstration(
             finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m, cast
         )
         group = None if which is None else _moving_model(assembly, surfaces, believed, which)
-        shares, located = _recognise(expected, surfaces, group, which, appearance)
+        shares, located = _find_model(expected, surfaces, group, which, appearance)
         if which is not None and located is not None:
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = turned_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
+            T = turn_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
             located = LocatedModel(T, _turn_covariance(located, T), located.explained)
@@ -152,7 +152,7 @@ def _find_owners(view: PinholeView, believed: Poses, cast: RayCaster) -> NDArray
     return owner.reshape(pixels.shape)
 
 
-def _recognise(
+def _find_model(
     expected: Expected,
     surfaces: Mapping[str, Surface],
     group: Model | None,

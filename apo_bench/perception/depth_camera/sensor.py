@@ -11,7 +11,7 @@ from apo_bench.geometry import Array, frozen
 from apo_bench.perception.depth_camera.follow import Event, Expected, follow_demonstration
 from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.perception.depth_camera.rays import MakeRayCaster
-from apo_bench.perception.observation.models import floored
+from apo_bench.perception.observation.models import floor_covariance
 
 _UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
 """The covariance that stands beside an operation that was not seen, [m, rad]."""
@@ -51,7 +51,11 @@ class RangeSensor:
                 covariance[k] = event.found.covariance
                 seen[k] = True
         return Observation(
-            assembly, demonstration.start, goals, floored(covariance + demonstration.human_error_covariance), seen
+            assembly,
+            demonstration.start,
+            goals,
+            floor_covariance(covariance + demonstration.human_error_covariance),
+            seen,
         )
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:

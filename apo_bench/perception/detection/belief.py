@@ -54,7 +54,7 @@ class Belief:
             reach[operation.main] = own
         return PartBeliefs(poses, reach)
 
-    def conditioned(self, e: Array, J: Array, noise: Array) -> "Belief":
+    def condition(self, e: Array, J: Array, noise: Array) -> "Belief":
         """The belief after learning that some quantities, now e (r,) with derivative J (r, 6 n), are zero up to noise.
 
         Args:

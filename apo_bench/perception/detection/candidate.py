@@ -43,7 +43,7 @@ class Candidate(NamedTuple):
         return self.contact.manipulated.part, self.contact.environment.part
 
 
-def judged(
+def judge_pair(
     seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: Facing, slope: Array, C: Array
 ) -> Candidate | None:
     """A pair of faces of parts a and b as a candidate that gains nothing yet; None beyond the thresholds.

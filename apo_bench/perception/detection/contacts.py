@@ -19,8 +19,14 @@ from apo_bench.assembly import Contact, Facing, Observation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
-from apo_bench.perception.detection.candidate import Candidate, judged
-from apo_bench.perception.detection.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
+from apo_bench.perception.detection.candidate import Candidate, judge_pair
+from apo_bench.perception.detection.evidence import (
+    DetectedContacts,
+    Evidence,
+    collect_evidence,
+    with_contacts,
+    without_contacts,
+)
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
 
 _BEGINNINGS = 12
@@ -28,7 +34,7 @@ _BEGINNINGS = 12
 
 
 @check_arguments
-def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recognised:
+def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> DetectedContacts:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
@@ -51,9 +57,9 @@ def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recogn
         around = _Around(observation, rules, k, others)
         best = around.likeliest(belief)
         belief = best.belief
-        evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
+        evidence += collect_evidence(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
-    return Recognised(with_contacts(assembly, evidence), tuple(evidence))
+    return DetectedContacts(with_contacts(assembly, evidence), tuple(evidence))
 
 
 class _Found(NamedTuple):
@@ -92,14 +98,14 @@ class _Around:
 
     def likeliest(self, belief: Belief) -> _Found:
         """The contacts that go together: of all beginnings, the set with the least score."""
-        best = self._followed(belief, None)
+        best = self._follow(belief, None)
         for first in best.left[:_BEGINNINGS]:
-            other = self._followed(belief, first)
+            other = self._follow(belief, first)
             if other.score < best.score:
                 best = other
         return best
 
-    def _followed(self, belief: Belief, first: Contact | None) -> _Found:
+    def _follow(self, belief: Belief, first: Contact | None) -> _Found:
         """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
         at_first = at_hand = self.candidates(belief)
         taken = list[Candidate]()
@@ -108,7 +114,7 @@ class _Around:
             chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
             if chosen.distance > self.rules.most_of(len(chosen.pair.residual)):
                 break
-            belief = belief.conditioned(chosen.pair.residual, chosen.slope, chosen.noise)
+            belief = belief.condition(chosen.pair.residual, chosen.slope, chosen.noise)
             taken.append(chosen)
             total += chosen.distance - chosen.gain
             at_hand = self.candidates(belief, [c.contact for c in taken])
@@ -122,7 +128,7 @@ class _Around:
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.observed].any():
             return
         C = slope @ belief.covariance @ slope.T
-        candidate = judged(self.seen, self.rules, a, b, now.poses[b], pair, slope, C)
+        candidate = judge_pair(self.seen, self.rules, a, b, now.poses[b], pair, slope, C)
         if candidate is not None:
             yield candidate._replace(gain=_gain(C, candidate.noise, self.rules, pair.lengths))
 

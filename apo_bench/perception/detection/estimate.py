@@ -17,7 +17,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Observation, joint_covariance, lowered
+from apo_bench.assembly import Assembly, Observation, joint_covariance, project_round_faces
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
@@ -98,7 +98,7 @@ def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
 def _softness(assembly: Assembly, play_m: float) -> Array:
     """(m, m): covariance of all equations of contacts that are there, [m^2]; their vertices together are off as one."""
     each = []
-    flat = lowered(assembly)
+    flat = project_round_faces(assembly)
     for operation in flat.operations:
         for contact in operation.contacts:
             carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2

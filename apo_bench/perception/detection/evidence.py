@@ -36,7 +36,7 @@ class Rival(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Recognised:
+class DetectedContacts:
     """The assembly with the contacts that were recognised, all of them asked to coincide."""
 
     assembly: Assembly
@@ -64,7 +64,7 @@ def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
     return replace(assembly, operations=operations)
 
 
-def evidence_of(
+def collect_evidence(
     assembly: Assembly, k: int, taken: Iterable[tuple[Contact, Facing, PairThresholds]], is_uncorrected: Poses
 ) -> list[Evidence]:
     """What speaks for the contacts of operation k, in the order of parts and faces.

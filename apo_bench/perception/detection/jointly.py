@@ -20,7 +20,13 @@ from apo_bench.assembly import Assembly, Contact, Observation, placements
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.candidate import Candidate
 from apo_bench.perception.detection.estimate import estimate
-from apo_bench.perception.detection.evidence import Recognised, Rival, evidence_of, with_contacts, without_contacts
+from apo_bench.perception.detection.evidence import (
+    DetectedContacts,
+    Rival,
+    collect_evidence,
+    with_contacts,
+    without_contacts,
+)
 from apo_bench.perception.detection.physics import IMPOSSIBLE, inside, physical_surprise, refusal
 from apo_bench.perception.detection.situation import Situation
 from apo_bench.perception.detection.thresholds import Rules
@@ -40,7 +46,7 @@ evidence away, beyond what physics says against the best."""
 
 
 @check_arguments
-def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -> Recognised:
+def detect_contacts_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -> DetectedContacts:
     """Find the face contacts of every operation together; those that the observation came with are not looked at.
 
     Returns:
@@ -57,7 +63,7 @@ def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -
         ended: dict[tuple[frozenset[Contact], ...], _History] = {}
         for history in kept:
             for partial in _Search(seen, rules, k, others, history).endings():
-                longer = history.followed(partial)
+                longer = history.follow(partial)
                 if longer.badness < ended.get(longer.key, _History(badness=np.inf)).badness:
                     ended[longer.key] = longer
         ranked = sorted(ended.values(), key=lambda history: history.badness)
@@ -80,7 +86,7 @@ class _History:
         """What makes it another one."""
         return tuple(frozenset(c.contact for c in some) for some in self.taken)
 
-    def followed(self, partial: "_Partial") -> "_History":
+    def follow(self, partial: "_Partial") -> "_History":
         """With one operation more."""
         return _History((*self.taken, partial.taken), partial.at.estimate.goals, partial.surprise, partial.badness)
 
@@ -197,7 +203,7 @@ def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assem
     return replace(assembly, operations=operations)
 
 
-def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
+def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
     """The best of the histories, with how likely it is, and the next best one."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
@@ -206,9 +212,9 @@ def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
         [
             each
             for k, (taken, poses) in enumerate(zip(history.taken, is_uncorrected, strict=True))
-            for each in evidence_of(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
+            for each in collect_evidence(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
         ]
         for history in kept[:2]
     ]
     rival = Rival(with_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
-    return Recognised(with_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)
+    return DetectedContacts(with_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)

@@ -12,7 +12,7 @@ from apo_bench.assembly import Contact, Facing, Observation
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.detection.belief import Belief, PartBeliefs
-from apo_bench.perception.detection.candidate import Candidate, judged
+from apo_bench.perception.detection.candidate import Candidate, judge_pair
 from apo_bench.perception.detection.estimate import GoalEstimate
 from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds
 
@@ -85,7 +85,7 @@ class Situation:
         """The pair as a candidate, if it is one."""
         J = pair.slope @ self._reach(a, b)
         C = J @ self.estimate.covariance @ J.T
-        candidate = judged(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
+        candidate = judge_pair(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
         if candidate is not None:
             soft = candidate.noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
             room = J @ self.estimate.room @ J.T

@@ -14,7 +14,7 @@ from apo_bench.names import resolve
 from apo_bench.perception.observation.models import NoiseLevel
 from apo_bench.perception.observation.models.failures import make_failures
 from apo_bench.perception.observation.noise_file import noise_path, presets
-from apo_bench.perception.observation.plain import declared
+from apo_bench.perception.observation.plain import declare
 from apo_bench.records import FAILURES
 
 __all__ = ["FAILURES", "NOISES", "Noise", "NoiseLevel", "make_noise"]
@@ -104,17 +104,11 @@ def _noise(model: Any, name: str, noise_level: NoiseLevel) -> Noise:
         f"the noise model '{name}' cannot be called with (assembly, shown, rng); give a function of these that returns "
         "an Observation.",
     )
-    noise: Noise = declared(model, name) if plain else model
-    return noise
+    return declare(model, name) if plain else model
 
 
 def _unknown(given: str, names: Iterable[str]) -> str:
     """What to say to a name that is none."""
-    if given.lower().endswith(".csv"):
-        return (
-            f"unknown noise model '{given}'; did you mean 'empirical:{given}'? That takes residuals, which "
-            "`apo-bench noise fit --residuals` writes; its --out writes a noise file, whose name ends in .toml."
-        )
     sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
     return sentence + " Or give your own as 'package.module:name'."
 

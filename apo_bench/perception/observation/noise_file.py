@@ -3,37 +3,75 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
-import numpy as np
+import msgspec
+from msgspec import Meta
 
-from apo_bench.geometry import Array, pose
-from apo_bench.io import JsonNode, read_toml
+from apo_bench.errors import require
+from apo_bench.geometry import Array
+from apo_bench.io import Table, Text, read_typed
 from apo_bench.perception.observation.models import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
     Camera,
-    ConstantError,
     Empirical,
     Fitted,
     MeasuredNoise,
     NoiseLevel,
     Split,
     Tail,
-    ViewNoise,
     empirical_noise,
 )
 from apo_bench.records import RESIDUALS
 from apo_bench.resources import folder
-from apo_bench.scenario.values import read_pose
+from apo_bench.scenario.values import Pose
+
+_FARTHEST_MM = 1e5
+_HUGE = 1e300
+"""Degrees of freedom beyond are infinitely many."""
+_Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Freedom = Annotated[float, Meta(ge=LEAST_FREEDOM)]
+
+
+def _split_table(name: str, unit: str) -> Any:
+    """Make the type of a table of the distribution of errors across and along a ray."""
+    fields = [
+        (f"limit_{unit}", Annotated[float, Meta(ge=1e-3)]),
+        (f"across_scale_{unit}", float),
+        ("across_degrees_of_freedom", _Freedom),
+        (f"along_scale_{unit}", float),
+        ("along_degrees_of_freedom", _Freedom),
+    ]
+    return msgspec.defstruct(name, fields, bases=(Table,), frozen=True)
+
+
+ShiftTable = _split_table("ShiftTable", "mm")
+"""`[shift]`."""
+TurnTable = _split_table("TurnTable", "deg")
+"""`[turn]`."""
+
+
+class NoiseTable(Table, frozen=True, kw_only=True):
+    """A whole file."""
+
+    schema: Literal["apo-bench/noise/2"]
+    source: Text
+    missed_rate: _Share
+    outlier_rate: _Share
+    outlier_farthest_mm: Annotated[float, Meta(le=_FARTHEST_MM)]
+    shift: ShiftTable  # type: ignore[valid-type]
+    turn: TurnTable  # type: ignore[valid-type]
+    camera: Pose | None = None
 
 
 def presets() -> Mapping[str, Path]:
-    """The noise files that come with the package, by the names they go by."""
+    """Return the noise files that come with the package, by the names they go by."""
     return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
 
 
 def noise_path(name: str) -> Path | None:
-    """The file behind the name of a noise model, None if there is none.
+    """Return the file behind the name of a noise model, None if there is none.
 
     A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
     """
@@ -44,17 +82,8 @@ def noise_path(name: str) -> Path | None:
     return presets().get(name)
 
 
-_SCHEMA = "apo-bench/noise/2"
-"""Without errors of the whole view."""
-_FARTHEST_MM = 1e5
-_LARGEST_VIEW_MM = 200.0
-_LARGEST_VIEW_DEG = 45.0
-_HUGE = 1e300
-"""Degrees of freedom beyond are infinitely many."""
-
-
 def noise_of_file(name: str, noise_level: NoiseLevel) -> Fitted | Empirical | None:
-    """The noise model of such a name, None if it is no such name.
+    """Make the noise model of such a name, None if it is no such name.
 
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
@@ -69,40 +98,54 @@ def noise_of_file(name: str, noise_level: NoiseLevel) -> Fitted | Empirical | No
 
 
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
-    """What a noise file states, and the camera it names, else the default one."""
-    required = ("source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
-    top = read_toml(path, "noise file").fields_of(_SCHEMA, required, ("camera", "view", "constant"))
-    shift = _split(top["shift"], "mm", 1000.0)
-    turn = _split(top["turn"], "deg", 180.0)
+    """Read what a noise file states, and the camera it names, else the default one.
+
+    Raises:
+        InputError: Anything in the file that is not as described, naming file and place.
+    """
+    top = read_typed(path, NoiseTable, "noise file")
+    shift = _split(top.shift, f"{path}, shift", 1000.0)
+    far = top.outlier_farthest_mm
+    require(far >= shift.limit, f"{path}, outlier_farthest_mm: the limit of the shift or more is needed, not {far:g}.")
     measured = MeasuredNoise(
-        source=top["source"].text(),
+        source=top.source,
         shift_mm=shift,
-        turn_deg=turn,
-        missed=_number(top["missed_rate"], 0.0, 1.0),
-        outliers=_number(top["outlier_rate"], 0.0, 1.0),
-        farthest_mm=_number(top["outlier_farthest_mm"], shift.limit, _FARTHEST_MM),
-        view=_view(top["view"]) if "view" in top else None,
-        constant=_constant(top["constant"]) if "constant" in top else None,
+        turn_deg=_split(top.turn, f"{path}, turn", 180.0),
+        missed=top.missed_rate,
+        outliers=top.outlier_rate,
+        farthest_mm=far,
     )
-    return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
+    return measured, Camera() if top.camera is None else Camera(top.camera.matrix)
+
+
+def _split(table: msgspec.Struct, place: str, largest: float) -> Split:
+    limit, across_scale, across_freedom, along_scale, along_freedom = msgspec.structs.astuple(table)
+    require(limit <= largest, f"{place}, limit: a number up to {largest:g} is needed, not {limit:g}.")
+    low = 0.9 * SMALLEST_SCALE * limit
+    for scale in (across_scale, along_scale):
+        require(low <= scale <= limit, f"{place}: scales from {low:g} to the limit are needed, not {scale:g}.")
+    return Split(_tail(across_scale, across_freedom), _tail(along_scale, along_freedom), limit)
+
+
+def _tail(scale: float, freedom: float) -> Tail:
+    return Tail(scale, freedom if freedom < _HUGE else math.inf)
 
 
 def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = (), T_world_camera: Array | None = None) -> str:
-    """A noise file, with notes at its head, and the pose of the camera if it is known."""
+    """Return a noise file as text, with notes at its head, and the pose of the camera if it is known."""
     source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
-    head = (
-        [f"# {note}" for note in notes],
-        [f'schema = "{_SCHEMA}"', f'source = "{source}"'],
-        [f"missed_rate = {measured.missed:.5g}  # of the parts that are there"],
-        [f"outlier_rate = {measured.outliers:.5g}  # of the parts that are found"],
-        [f"outlier_farthest_mm = {measured.farthest_mm:.5g}"],
-        _split_lines("shift", measured.shift_mm, "mm"),
-        _split_lines("turn", measured.turn_deg, "deg"),
-        [] if T_world_camera is None else _camera_lines(T_world_camera),
-        [] if measured.view is None else _view_lines(measured.view),
-        [] if measured.constant is None else _constant_lines(measured.constant),
-    )
-    return "\n".join(line for lines in head for line in lines) + "\n"
+    lines = [
+        *(f"# {note}" for note in notes),
+        'schema = "apo-bench/noise/2"',
+        f'source = "{source}"',
+        f"missed_rate = {measured.missed:.5g}  # of the parts that are there",
+        f"outlier_rate = {measured.outliers:.5g}  # of the parts that are found",
+        f"outlier_farthest_mm = {measured.farthest_mm:.5g}",
+        *_split_lines("shift", measured.shift_mm, "mm"),
+        *_split_lines("turn", measured.turn_deg, "deg"),
+        *([] if T_world_camera is None else _camera_lines(T_world_camera)),
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def _split_lines(name: str, split: Split, unit: str) -> list[str]:
@@ -117,69 +160,5 @@ def _camera_lines(T_world_camera: Array) -> list[str]:
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_matrix(T_world_camera[:3, :3]).as_euler("xyz", degrees=True)
-    at = 1e3 * T_world_camera[:3, 3]
-    return ["", "[camera]  # in the world", f"at_mm = {_listed(at)}", f"turn_deg = {_listed(turn)}"]
-
-
-def _view_lines(view: ViewNoise) -> list[str]:
-    return [
-        *("", "[view]  # one error for each demonstration, about the middle of what is seen"),
-        *(f"shift_mm = {view.shift_mm:.5g}", f"turn_deg = {view.turn_deg:.5g}"),
-    ]
-
-
-def _constant_lines(constant: ConstantError) -> list[str]:
-    packed = pose.pack(constant.frame)
-    shift = constant.twist[:3] * 1e3
-    turn = np.degrees(constant.twist[3:])
-    return [
-        *("", "[constant]  # what is seen is displaced by this, in this frame"),
-        *(f"shift_mm = {_listed(shift)}", f"turn_deg = {_listed(turn)}"),
-        *(f"position_mm = {_listed(packed[:3] * 1e3)}", f"quaternion_wxyz = {_listed(packed[3:])}"),
-    ]
-
-
-def _listed(numbers: Array) -> str:
-    return f"[{', '.join(f'{x:.9g}' for x in numbers)}]"
-
-
-def _view(node: JsonNode) -> ViewNoise:
-    keys = node.fields(("shift_mm", "turn_deg"))
-    return ViewNoise(
-        _number(keys["shift_mm"], 0.0, _LARGEST_VIEW_MM), _number(keys["turn_deg"], 0.0, _LARGEST_VIEW_DEG)
-    )
-
-
-def _constant(node: JsonNode) -> ConstantError:
-    keys = node.fields(("shift_mm", "turn_deg", "position_mm", "quaternion_wxyz"))
-    shift = keys["shift_mm"].numbers(3)
-    turn = keys["turn_deg"].numbers(3)
-    q = keys["quaternion_wxyz"].quaternion()
-    if np.abs(shift).max() > _LARGEST_VIEW_MM:
-        keys["shift_mm"].fail(f"numbers from {-_LARGEST_VIEW_MM:g} to {_LARGEST_VIEW_MM:g} are needed")
-    if np.abs(turn).max() > _LARGEST_VIEW_DEG:
-        keys["turn_deg"].fail(f"numbers from {-_LARGEST_VIEW_DEG:g} to {_LARGEST_VIEW_DEG:g} are needed")
-    place = keys["position_mm"].numbers(3)
-    if np.abs(place).max() > _FARTHEST_MM:
-        keys["position_mm"].fail(f"numbers of at most {_FARTHEST_MM:g} are needed")
-    twist = np.concatenate([shift * 1e-3, np.radians(turn)])
-    return ConstantError(twist, pose.unpack(np.concatenate([place * 1e-3, q])))
-
-
-def _split(node: JsonNode, unit: str, largest: float) -> Split:
-    tails = [(f"{d}_scale_{unit}", f"{d}_degrees_of_freedom") for d in ("across", "along")]
-    keys = node.fields((f"limit_{unit}", *(key for pair in tails for key in pair)))
-    limit = _number(keys[f"limit_{unit}"], 1e-3, largest)
-    across, along = (
-        Tail(_number(keys[scale], 0.9 * SMALLEST_SCALE * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
-        for scale, freedom in tails
-    )
-    return Split(across, along, limit)
-
-
-def _number(node: JsonNode, low: float, high: float) -> float:
-    """A number within bounds; infinity only where that is the bound."""
-    x = node.value
-    if isinstance(x, bool) or not isinstance(x, int | float) or not low <= x <= high:
-        node.fail(f"a number from {low:g}{' on, or inf,' if high == math.inf else f' to {high:g}'} is needed")
-    return float(x) if x < _HUGE else math.inf
+    at, angles = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (1e3 * T_world_camera[:3, 3], turn))
+    return ["", "[camera]  # in the world", f"at_mm = [{at}]", f"turn_deg = [{angles}]"]

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
-from apo_bench.geometry import Array, is_rigid
+from apo_bench.geometry import is_rigid
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.records import noise_pair
 
@@ -55,26 +55,22 @@ def observe(
 def _complaint(demonstration: Demonstration, seen: Any) -> str:
     """What is wrong with what a noise model returned; empty if nothing is."""
     if not isinstance(seen, Observation):
-        return f"returned {type(seen).__name__}; return an apo_bench.assembly.goals.Observation"
+        return f"returned {type(seen).__name__}; return an apo_bench.assembly.Observation"
     if seen.assembly is not demonstration.assembly:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
     if set(seen.start) != set(demonstration.start):
         return "changed which parts have a start pose; pass on `shown.start`"
-    for wrong in np.flatnonzero(~is_rigid(seen.poses)):
+    if not is_rigid(seen.poses).all():
+        k = int(np.argmin(is_rigid(seen.poses)))
+        return f"returned a pose of operation {k + 1} that is not rigid; return `shown.poses[k] @ exp(twist)`"
+    # On correlations, so that [m] and [rad] weigh the same.
+    deviation = np.sqrt(np.maximum(np.diagonal(seen.covariance, axis1=1, axis2=2), 1e-300))
+    correlation = seen.covariance / (deviation[:, :, None] * deviation[:, None, :])
+    off = np.abs(correlation - np.swapaxes(correlation, 1, 2)).max(axis=(1, 2), initial=0.0)
+    wrong = np.flatnonzero((off >= 1e-9) | (np.linalg.eigvalsh(correlation)[:, 0] <= 1e-12))
+    if wrong.size:
         return (
-            f"returned a goal for operation {wrong + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
+            f"returned a covariance for operation {wrong[0] + 1} that is not symmetric and positive definite; "
+            "state a variance above zero in every direction"
         )
-    for k, C in enumerate(seen.covariance):
-        if not _positive_definite(C):
-            return (
-                f"returned a covariance for operation {k + 1} that is not symmetric and positive definite; "
-                "state a variance above zero in every direction"
-            )
     return ""
-
-
-def _positive_definite(C: Array) -> bool:
-    """Judged on correlations, so that [m] and [rad] weigh the same."""
-    deviation = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    correlation = C / np.outer(deviation, deviation)
-    return bool(np.abs(correlation - correlation.T).max() < 1e-9 and np.linalg.eigvalsh(correlation)[0] > 1e-12)

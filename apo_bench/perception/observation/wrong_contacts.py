@@ -1,15 +1,16 @@
-"""Wrong relations: what touches what is told wrongly, to see what a corrector makes of that.
+"""Wrong contacts, to see what a corrector makes of them.
 
 `missed`     one contact was not noticed
 `false`      one contact too many: two faces that only come near each other
 `shifted:3`  one face is not where the model of its part says, by 3 mm along its normal
 
-The truth, the human, the robot and the judge keep the right relations; only what a corrector is told is wrong.
+The truth, the human, the robot and the judge keep the right contacts; only what a corrector gets is wrong.
 """
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -19,13 +20,12 @@ from apo_bench.assembly import (
     Contact,
     Gap,
     Observation,
-    Operation,
     PartFace,
     Poses,
     contact_kind,
+    faces_oppose,
     height,
     measure_round,
-    opposed,
     placements,
     relation_graph,
     round_pairs,
@@ -35,8 +35,8 @@ from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
 from apo_bench.names import resolve
 from apo_bench.records import GIVEN, SHIFT_MM, WRONG_CONTACTS, contact_source_name
 
-Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
-"""Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
+ContactSource = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
+"""Any function `(assembly, start, poses, rng) -> Assembly`: right contacts and poses in, wrong contacts out."""
 
 _OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
@@ -49,8 +49,8 @@ _SHARED = 0.15
 """Round faces that have less of their length in common do not meet."""
 
 
-def make_contacts(given: Any) -> Relations | None:
-    """The function that a name stands for; None for `given`, where nothing is wrong.
+def make_contacts(given: Any) -> ContactSource | None:
+    """Return the function that a name stands for; None for `given`, where nothing is wrong.
 
     Args:
         given: `given`, `missed`, `false`, `shifted:3` (mm), `"package.module:name"`, or the function itself.
@@ -58,20 +58,23 @@ def make_contacts(given: Any) -> Relations | None:
     Raises:
         InputError: There is no such thing.
     """
-    if not isinstance(given, str):
-        return _callable(given, getattr(given, "__name__", type(given).__name__))
-    name = contact_source_name(given)
+    name = contact_source_name(given) if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
     if name == GIVEN:
         return None
-    if name.startswith("shifted:"):
+    if isinstance(given, str) and name.startswith("shifted:"):
         return Shifted(float(name.partition(":")[2]) * 1e-3)
-    return _callable(resolve(name, WRONG_CONTACTS, "kind of relations"), name)
+    source = resolve(name, WRONG_CONTACTS, "source of contacts") if isinstance(given, str) else given
+    require(
+        callable(source) and not isinstance(source, type),
+        f"the source of contacts '{name}' is no function; give (assembly, start, poses, rng) -> Assembly.",
+    )
+    return source
 
 
 def with_contacts(
-    observation: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
+    observation: Observation, source: ContactSource | None, truth: Array, rng: np.random.Generator
 ) -> Observation:
-    """An observation with wrong relations in place of the right ones.
+    """Return an observation with wrong contacts in place of the right ones.
 
     Args:
         truth: (n, 4, 4), the true goals, world frame, [m].
@@ -79,25 +82,26 @@ def with_contacts(
     Raises:
         InputError: The function raised an error, or returned something other than an assembly of the same operations.
     """
-    if relations is None:
+    if source is None:
         return observation
-    name = getattr(relations, "__name__", type(relations).__name__)
+    name = f"the source of contacts '{getattr(source, '__name__', type(source).__name__)}'"
     try:
-        wrong = relations(observation.assembly, observation.start, truth, rng)
+        wrong = source(observation.assembly, observation.start, truth, rng)
         complaint = _complaint(observation.assembly, wrong)
     except InputError:
         raise
     except RAISED as error:
-        raise failed(f"the relations '{name}'", error) from error
-    require(not complaint, f"the relations '{name}' {complaint}.")
+        raise failed(name, error) from error
+    require(not complaint, f"{name} {complaint}.")
     return replace(observation, assembly=wrong)
 
 
 def _complaint(right: Assembly, wrong: Any) -> str:
-    """What is wrong with what a function for relations returned; empty if nothing is."""
+    """Return what is wrong with what a source of contacts returned; empty if nothing is."""
     if not isinstance(wrong, Assembly):
         return f"returned {type(wrong).__name__}; return an Assembly"
-    if _acts(wrong) != _acts(right) or set(wrong.solids) != set(right.solids):
+    operations, before = ([replace(each, contacts=()) for each in of.operations] for of in (wrong, right))
+    if operations != before or set(wrong.solids) != set(right.solids):
         return "changed parts or operations; change nothing but contacts and faces"
     for relation in wrong.relations():
         for part, face in relation.contact:
@@ -140,7 +144,7 @@ def false(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generat
 @final
 @dataclass(frozen=True)
 class Shifted:
-    """One contact, any, is told with its lower face off along the normal, outwards or inwards.
+    """One contact, any, has its lower face off along the normal, outwards or inwards.
 
     A round face is off across its axis, in any direction.
     """
@@ -172,7 +176,7 @@ class _Pair(NamedTuple):
 def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
     """One of all contacts ever made, each as likely, and the operation that made it."""
     relations = assembly.relations()
-    require(relations, "wrong relations were asked for, but the assembly has no contact; use `given`.")
+    require(relations, "the assembly has no contact that could be wrong; use `given`.")
     chosen = relations[int(rng.integers(len(relations)))]
     return chosen.made, chosen.contact
 
@@ -185,27 +189,19 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
         standing |= dict.fromkeys(moves)
         for part in moves:
             for other in (p for p in standing if p not in moves):
-                for a in assembly.solids[part].faces.values():
-                    for b in assembly.solids[other].faces.values():
-                        contact = Contact(PartFace(part, a.name), PartFace(other, b.name))
-                        apart = _apart(a, poses[part], b, poses[other])
-                        if apart is not None and contact not in assembly.operations[k].contacts:
-                            area = overlap(a, poses[part], b, poses[other]).area
-                            yield _Pair(k, contact, apart, area > _COVERED_M2)
+                for a, b in product(assembly.solids[part].faces.values(), assembly.solids[other].faces.values()):
+                    contact = Contact(PartFace(part, a.name), PartFace(other, b.name))
+                    apart = height(a, poses[part], b, poses[other])
+                    near = apart > TOUCHING_M and faces_oppose(a, poses[part], b, poses[other], _OPPOSED_RAD)
+                    if near and contact not in assembly.operations[k].contacts:
+                        area = overlap(a, poses[part], b, poses[other]).area
+                        yield _Pair(k, contact, apart, area > _COVERED_M2)
                 for c, d in round_pairs(assembly.solids[part], assembly.solids[other]):
                     contact = Contact(PartFace(part, c.name), PartFace(other, d.name))
                     measured = measure_round(c, poses[part], d, poses[other])
                     near = measured.angle_rad < _OPPOSED_RAD and measured.gap_m > TOUCHING_M
                     if near and contact not in assembly.operations[k].contacts:
                         yield _Pair(k, contact, measured.gap_m, measured.share > _SHARED)
-
-
-def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
-    """How far face a stands in front of face b, [m]; None if they do not look at each other, or touch."""
-    if not opposed(a, T_a, b, T_b, _OPPOSED_RAD):
-        return None
-    apart = height(a, T_a, b, T_b)
-    return apart if apart > TOUCHING_M else None
 
 
 def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Generator) -> Face | RoundFace:
@@ -229,16 +225,3 @@ def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly
     operations = list(assembly.operations)
     operations[k] = replace(operations[k], contacts=contacts)
     return replace(assembly, operations=tuple(operations))
-
-
-def _acts(assembly: Assembly) -> list[Operation]:
-    """The operations without their contacts."""
-    return [replace(operation, contacts=()) for operation in assembly.operations]
-
-
-def _callable(given: Any, name: str) -> Relations:
-    require(
-        callable(given) and not isinstance(given, type),
-        f"the relations '{name}' are no function; give (assembly, start, goals, rng) -> Assembly.",
-    )
-    return given

@@ -1,18 +1,11 @@
-"""The command that runs the trial of a row again.
-
-Which trials name code of somebody's own, which is imported to run them: `package.module:name`.
-
-A file is data. What rows or `run.json` name is never imported unless it comes with the package, or a person says that
-the folder is trusted.
-"""
+"""The command that runs the trial of a record again."""
 
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
+from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.settings import DEPTH_CAMERA, NOISE_LEVEL, SETTINGS
-from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS, WRONG
-from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
 _SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
@@ -25,7 +18,7 @@ Files = Mapping[str, str]
 
 
 def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
-    """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
+    """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
     return f"{without_seed(row, files, limits)} --seed {row['seed']}"
 
 
@@ -33,7 +26,7 @@ def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Lim
     """A replay command without its seed: what the trials of a cell have in common."""
     scenario = str((files or {}).get(row["scenario"], row["scenario"]))
     scenario = f"./{scenario}" if scenario.startswith("-") else scenario
-    return shlex.join(["apo-bench", "replay", scenario, *_options(row, limits)])
+    return shlex.join(["apo-bench", "run", scenario, *_options(row, limits)])
 
 
 def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
@@ -70,39 +63,3 @@ def milli(seconds: float) -> float:
     """In thousandths, such that these times 1e-3 are the same number again wherever there are such."""
     rounded = float(f"{seconds * 1e3:.12g}")
     return rounded if rounded * 1e-3 == seconds else seconds * 1e3
-
-
-DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
-    "method": (),
-    "arm": FOREIGN_ARMS,
-    "noise": (RESIDUALS, *(f"{name}:" for name in FAILURES)),
-    "contact_source": tuple(f"{kind}:" for kind in WRONG),
-}
-"""Column -> how names with a colon begin that are data, and no code."""
-_MOST = 3
-"""Names in the sentence."""
-
-
-def own_code(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """What of a row is code of somebody's own; files of noise and scenarios are data."""
-    names = [row[column] for column, data in DATA_PREFIXES.items() if is_own_code(row[column], data)]
-    return tuple(dict.fromkeys(names))
-
-
-def is_own_code(name: str, data: tuple[str, ...]) -> bool:
-    """Whether a name is `module:name`, and none that begins as one of the `DATA_PREFIXES`."""
-    return ":" in name and not name.startswith(data)
-
-
-def left_out(rows: Iterable[Mapping[str, Any]]) -> str:
-    """The sentence on failed trials that are not run again for a picture; empty if there are none."""
-    of_rows = [own for row in rows if row["success"] is False and (own := own_code(row))]
-    if not of_rows:
-        return ""
-    names = list(dict.fromkeys(name for own in of_rows for name in own))
-    more = f" and {len(names) - _MOST} more" * (len(names) > _MOST)
-    many = "1 failed trial names" if len(of_rows) == 1 else f"{len(of_rows):,} failed trials name"
-    return (
-        f"{many} code that does not come with the package ({', '.join(names[:_MOST])}{more}); a report runs it only "
-        "with --trust-code"
-    )

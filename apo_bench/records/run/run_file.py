@@ -1,40 +1,40 @@
-"""`run.json`: what a sweep was asked to do and what its rows are made of; and whether another sweep is the same."""
+"""`run.json`: the settings of a sweep and what its records are made of; whether another sweep is the same."""
 
 import json
 import os
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import read_bytes, write_file
+from apo_bench.io import clean, read_bytes, write_file
+from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.run.validation import run_of
 from apo_bench.records.secret_seed import SecretSeed
-from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
-_RUN = "apo-bench/run/3"
+_RUN = "apo-bench/run/4"
 _LARGEST_BYTES = 16_000_000
 
 
 def run_record(
     grids: Sequence[Mapping[str, Any]],
     content: Mapping[str, str],
-    code: Mapping[str, str],
     versions: Mapping[str, str],
     files: Mapping[str, str],
     command: str,
     secret_seed: SecretSeed | None = None,
     limits: Limits = USUAL_LIMITS,
+    revision: str = "",
 ) -> dict[str, Any]:
-    """What `run.json` says.
+    """The content of `run.json`.
 
     Args:
         grids: From `described`.
-        content: What the trials are made of besides the package -> its hash.
-        code: Source file -> its hash.
+        content: Input of the trials -> its hash.
         files: Scenarios that were given as files: name -> path.
-        versions: Of packages that may show in a row.
+        versions: Package -> version, of those that may show in a record.
+        revision: Git revision of the package; it is noted and not compared.
     """
     return {
         "schema": _RUN,
@@ -46,8 +46,8 @@ def run_record(
         "versions": dict(versions),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "command": command,
-        "code": dict(code),
+        "command": clean(command),
+        "revision": revision or None,
     }
 
 
@@ -85,41 +85,32 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     except InputError as error:
         raise InputError(f"'{folder}' has trials but no readable run.json ({error}); choose another folder.") from error
     schema = before.get("schema")
-    require(schema is not None, f"'{folder}' has trials but no readable run.json; choose another folder.")
     require(
         schema == _RUN, f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder."
     )
     now = json.loads(json.dumps(run))
-    grids = before.get("grids")
-    if not isinstance(grids, list) or len(grids) != len(now["grids"]):
-        count = len(grids) if isinstance(grids, list) else 0
-        _refuse(folder, f"it had {count} grids, now {len(now['grids'])}")
-    for i, (old, new) in enumerate(zip(grids, now["grids"], strict=True), start=1):
-        _refuse_other(folder, f"grid {i}" if len(grids) > 1 else "grid", old, new)
-    _refuse_changed(folder, "code: apo_bench/{} changed", before.get("code"), now["code"])
-    _refuse_other(folder, "versions", before.get("versions"), now["versions"])
-    _refuse_changed(folder, "inputs changed: {}", before.get("content"), now["content"])
+    grids = before.get("grids", [])
+    count = f"it had {len(grids)} grids, now {len(now['grids'])}" if len(grids) != len(now["grids"]) else ""
+    differences = [
+        *(("grid", _difference(old, new, may_grow=True)) for old, new in zip(grids, now["grids"], strict=False)),
+        ("versions", _difference(before.get("versions"), now["versions"])),
+        ("inputs", _difference(before.get("content"), now["content"])),
+    ]
+    why = count or next((f"{what}: {text}" for what, text in differences if text), "")
+    require(not why, f"'{folder}' holds trials of another sweep ({why}); choose another folder.")
 
 
-def _refuse_changed(folder: Path, what: str, before: Any, now: Mapping[str, str]) -> None:
-    """Nothing that has a hash may differ."""
-    before = before if isinstance(before, dict) else {}
-    changed = sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
-    if changed:
-        more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
-        _refuse(folder, what.format(f"{changed[0]}{more}"))
+def _difference(before: Any, now: Mapping[str, Any], *, may_grow: bool = False) -> str:
+    """The first key with another value, and both values; empty if there is none.
 
-
-def _refuse_other(folder: Path, what: str, before: Any, now: Mapping[str, Any]) -> None:
-    """More trials of the same grid are welcome; anything else that differs makes another sweep."""
+    Args:
+        may_grow: More `trials` are no difference.
+    """
     before = before if isinstance(before, dict) else {}
     for key in sorted({*before, *now}):
         old = before.get(key)
         new = now.get(key)
-        grown = what.startswith("grid") and key == "trials" and isinstance(old, int) and old <= (new or 0)
+        grown = may_grow and key == "trials" and isinstance(old, int) and old <= (new or 0)
         if old != new and not grown:
-            _refuse(folder, f"{what}: {key} was {json.dumps(old)}, now {json.dumps(new)}")
-
-
-def _refuse(folder: Path, why: str) -> NoReturn:
-    raise InputError(f"'{folder}' holds trials of another sweep ({why}); choose another folder.")
+            return f"{key} was {json.dumps(old)}, now {json.dumps(new)}"
+    return ""

@@ -1,23 +1,23 @@
-"""The folder of a sweep: rows that are only ever appended, whole, and what the sweep was asked to do.
+"""The folder of a sweep: records that are only appended, each whole, and the settings of the sweep.
 
-trials.jsonl   one row per trial; nothing but what specification and seed determine
-timing.jsonl   one line per trial: wall times, host, worker; lines that are missing do not matter
-run.json       grids, code, content, versions, command line
-torn.txt       half lines that an interrupted sweep left behind, if any
+trials.jsonl   one record per trial: only what settings and seed determine
+timing.jsonl   one line per trial: wall times, host, worker; missing lines do not matter
+run.json       grids, inputs, versions, command line, git revision
+torn.txt       half lines of an interrupted sweep, if any
 """
 
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import IO, Any, Self, final
+from typing import Any, Self, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, each_line, is_there, open_to_append, put_back
+from apo_bench.io import check_target, each_line, open_to_append
 from apo_bench.records.record import Key, TrialRecord, record_key
 from apo_bench.records.run.run_file import check_same, write_run
-from apo_bench.records.run.validation import row_of, unwritable
+from apo_bench.records.run.validation import record_of, unwritable
 from apo_bench.records.secret_seed import check_same_secret_seed
 
 CHUNK = 1 << 16
@@ -25,33 +25,32 @@ CHUNK = 1 << 16
 
 @final
 class RunFolder:
-    """Appends rows to the folder of a sweep, and lets nobody else do so meanwhile; a context manager."""
+    """Append records to the folder of a sweep and keep other writers out; a context manager."""
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
-        """Open a folder, made if it is not there.
+        """Open a folder, which is made if it does not exist.
 
         Raises:
             InputError: The folder cannot be written, is being written, or holds trials of another sweep.
         """
         self.folder = folder
-        self._run = run
         self.finished: dict[Key, str] = {}
-        """The trials that have a row, and its `config_hash`."""
+        """Key of each trial that has a record -> its `config_hash`."""
         try:
-            self._place = folder.absolute()
             folder.mkdir(parents=True, exist_ok=True)
-            self._trials: IO[bytes] = open_to_append(folder / "trials.jsonl")
-            try:
+            with ExitStack() as opened:
+                self._trials = opened.enter_context(open_to_append(folder / "trials.jsonl"))
                 _lock(self._trials.fileno(), folder)
                 for name in ("trials.jsonl", "timing.jsonl"):
                     _set_torn_line_aside(folder / name)
-                self._read(run)
+                for record in each_record(folder):
+                    check_same_secret_seed(f"'{folder}'", run.get("secret_seed"), record["secret_seed"])
+                    self.finished[record_key(record)] = record["config_hash"]
+                if self.finished:
+                    check_same(folder, run)
                 write_run(folder, run)
-                self._timing: IO[bytes] = open_to_append(folder / "timing.jsonl")
-                self._size = os.fstat(self._trials.fileno()).st_size
-            except BaseException:
-                self._trials.close()
-                raise
+                self._timing = opened.enter_context(open_to_append(folder / "timing.jsonl"))
+                self._files = opened.pop_all()
         except OSError as error:
             raise InputError(
                 f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
@@ -61,90 +60,52 @@ class RunFolder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._trials.close()
-        self._timing.close()
+        self._files.close()
 
-    def append(self, row: Mapping[str, Any], timing: Mapping[str, Any]) -> None:
+    def append(self, record: Mapping[str, Any], timing: Mapping[str, Any]) -> None:
         """Add a trial that has ended, each line in one write.
 
         Raises:
-            RuntimeError: The row could not be written, such as on a full disk; what was written of it is taken back.
-                Or it is none by the table of fields, so that nobody could read it again.
+            RuntimeError: The record does not fit the table of fields, or cannot be written, as on a full disk; then
+                the half line is removed.
         """
-        wrong = unwritable(row)
+        kept = f"the {len(self.finished)} before it are kept"
+        wrong = unwritable(record)
         if wrong:
-            raise RuntimeError(
-                f"a row was made that is none ({wrong}); the {len(self.finished)} before it are kept in {self.folder}."
-            )
-        self._keep()
+            raise RuntimeError(f"a record is not valid ({wrong}); {kept} in {self.folder}.")
         try:
-            self._size += _append(self._trials.fileno(), row)
+            _append(self._trials.fileno(), record)
         except OSError as error:
             raise RuntimeError(
-                f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
-                f"{len(self.finished)} before it are kept, and the same command continues once there is room."
+                f"a record could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); {kept}, and the "
+                "same command continues once there is room."
             ) from error
-        self.finished[record_key(row)] = row["config_hash"]
+        self.finished[record_key(record)] = record["config_hash"]
         with suppress(OSError):
             _append(self._timing.fileno(), timing)
 
-    def rows(self) -> list[TrialRecord]:
-        """All rows of the folder."""
-        self._keep()
-        return read_rows(self._place)
 
-    def _keep(self) -> None:
-        """Put the files back where they were if somebody has removed them.
-
-        Raises:
-            RuntimeError: They cannot be, or rows were taken out of them.
-        """
-        lost = f"the rows of this sweep were removed from '{self.folder}' by somebody else, and"
-        if os.fstat(self._trials.fileno()).st_size < self._size:
-            raise RuntimeError(f"{lost} are lost; the same command runs their trials again.")
-        if is_there(self._trials, self._place / "trials.jsonl"):
-            return
-        try:
-            trials = put_back(self._trials, self._place / "trials.jsonl")
-            self._trials.close()
-            self._trials = trials
-            _lock(trials.fileno(), self.folder)
-            timing = put_back(self._timing, self._place / "timing.jsonl")
-            self._timing.close()
-            self._timing = timing
-            write_run(self._place, self._run)
-        except (OSError, InputError) as error:
-            raise RuntimeError(f"{lost} cannot be put back ({error}); the same command runs them.") from error
-
-    def _read(self, run: Mapping[str, Any]) -> None:
-        for row in each_row(self.folder):
-            check_same_secret_seed(f"'{self.folder}'", run.get("secret_seed"), row["secret_seed"])
-            self.finished[record_key(row)] = row["config_hash"]
-        if self.finished:
-            check_same(self.folder, run)
-
-
-def read_rows(folder: str | Path) -> list[TrialRecord]:
-    """The rows of a sweep, in the order in which they ended; a torn last line is left out.
+def read_records(folder: str | Path) -> list[TrialRecord]:
+    """The records of a sweep, in the order in which the trials ended, without a torn last line.
 
     Raises:
-        InputError: No such folder, no trials in it, or a line that is not a row.
+        InputError: No such folder, no trials in it, or a line that is not a record.
     """
-    return list(each_row(folder))
+    return list(each_record(folder))
 
 
-def each_row(folder: str | Path) -> Iterator[TrialRecord]:
-    """The rows of a folder one after the other, so that a reader need not hold them all."""
+def each_record(folder: str | Path) -> Iterator[TrialRecord]:
+    """The records of a folder one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
     require(
         path.exists(),
         f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote.",
     )
-    yield from (row_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of trials"))
+    yield from (record_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of trials"))
 
 
 def _lock(file: int, folder: Path) -> None:
-    """Nobody else may write until the file is closed or the process ends, in whatever way."""
+    """Keep other writers out until the file is closed or the process ends."""
     try:
         import fcntl
     except ImportError:
@@ -159,9 +120,9 @@ def _lock(file: int, folder: Path) -> None:
         return
 
 
-def _append(file: int, line: Mapping[str, Any]) -> int:
-    """Add a line whole, or not at all; how many bytes it has."""
-    whole = left = json.dumps(line, allow_nan=False).encode() + b"\n"
+def _append(file: int, line: Mapping[str, Any]) -> None:
+    """Add a whole line, or nothing."""
+    left = json.dumps(line, allow_nan=False).encode() + b"\n"
     before = os.fstat(file).st_size
     try:
         while left:
@@ -170,11 +131,10 @@ def _append(file: int, line: Mapping[str, Any]) -> int:
         with suppress(OSError):
             os.ftruncate(file, before)
         raise
-    return len(whole)
 
 
 def _set_torn_line_aside(path: Path) -> None:
-    """What follows the last end of a line is no row: a copy of it is kept, and it goes."""
+    """Move what follows the last end of a line, which is no record, into another file."""
     check_target(path)
     if not path.exists():
         return

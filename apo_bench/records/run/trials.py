@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import Array
 from apo_bench.records.record import RECORD_FIELDS
-from apo_bench.records.run.run_folder import each_row
+from apo_bench.records.run.run_folder import each_record
 from apo_bench.records.secret_seed import common_secret_seed
 from apo_bench.records.settings import SETTINGS
 
@@ -187,4 +187,4 @@ def read_trials(folder: str | Path) -> Trials:
     Raises:
         InputError: No such folder, no trials in it, or a line that is not a whole record.
     """
-    return trials_of(each_row(folder))
+    return trials_of(each_record(folder))

@@ -1,6 +1,12 @@
 """Assemblies that a seed draws: parts, contacts, order and grasps by construction."""
 
 from apo_bench.scenario.generated.families import FAMILIES
-from apo_bench.scenario.generated.names import drawn, generated_file, is_generated, whole_name, write_generated
+from apo_bench.scenario.generated.names import (
+    generate_assembly,
+    generated_file,
+    is_generated,
+    whole_name,
+    write_generated,
+)
 
-__all__ = ("FAMILIES", "drawn", "generated_file", "is_generated", "whole_name", "write_generated")
+__all__ = ("FAMILIES", "generate_assembly", "generated_file", "is_generated", "whole_name", "write_generated")

@@ -16,8 +16,8 @@ from apo_bench.scenario.parts.making import (
     join,
     polygon,
     rectangle,
+    revolve,
     shaft,
-    turned,
 )
 
 _SIDES = ("ny", "px", "py", "nx")
@@ -84,12 +84,12 @@ def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
         Frustum(ledge, end - _CHAMFER, radius, name="neck"),
         Frustum(end - _CHAMFER, end, radius, radius - _CHAMFER, "neck_chamfer"),
     ]
-    return turned(steps, flats={0: "tip", deep: "shoulder", ledge: "ledge", end: "head"})
+    return revolve(steps, flats={0: "tip", deep: "shoulder", ledge: "ledge", end: "head"})
 
 
 def ring(outer: float, inner: float, height: float) -> Body:
     """A disc with a bore: faces `bore`, `low`, `high`."""
-    return turned(
+    return revolve(
         [Frustum(0, height, outer)],
         [Frustum(0, height, inner, name="bore", fit=True)],
         flats={0: "low", height: "high"},
@@ -137,7 +137,7 @@ def rod(radius: float, length: float, grip: float) -> Body:
         Frustum(2, length - _CHAMFER, radius, name="side"),
         Frustum(length - _CHAMFER, length, radius, radius - _CHAMFER),
     ]
-    return join(square, turned(steps, flats={length: "tip"})).moved((0, 0, radius), (0, 90, 0))
+    return join(square, revolve(steps, flats={length: "tip"})).moved((0, 0, radius), (0, 90, 0))
 
 
 def along_x(section: Sequence[Edge], length: float) -> Body:

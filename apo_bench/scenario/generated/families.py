@@ -5,10 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembled import BOARD, Assembled, Station, merged, shifted, split
+from apo_bench.scenario.generated.assembly import BOARD, GeneratedAssembly, Station, merge_orders, shift_station, split
 from apo_bench.scenario.generated.bodies import TOP
-from apo_bench.scenario.generated.linked import bridged, castled, grooved, keyed, pinned, threaded
-from apo_bench.scenario.generated.stations import carried, corner, covered, peg, post
+from apo_bench.scenario.generated.linked import (
+    make_bridged,
+    make_castled,
+    make_grooved,
+    make_keyed,
+    make_pinned,
+    make_threaded,
+)
+from apo_bench.scenario.generated.stations import make_carried, make_corner, make_covered, make_peg, make_post
 from apo_bench.scenario.parts.making import Body, extrude, join, rectangle
 
 _GAP = 10.0
@@ -40,7 +47,7 @@ class Family(NamedTuple):
     needs_more: bool
     """Whether laying each part onto its newest contacts is not enough."""
 
-    def draw(self, rng: np.random.Generator) -> Assembled:
+    def draw(self, rng: np.random.Generator) -> GeneratedAssembly:
         """One assembly of the family."""
         stations = list[Station]()
         while not stations or _length(stations) > _LONGEST:
@@ -52,7 +59,7 @@ class Family(NamedTuple):
             if sum(least) <= size <= sum(most):
                 parts = split(rng, size, least, most)
                 stations = [kind.make(rng, str(i), n) for i, (kind, n) in enumerate(zip(kinds, parts, strict=True), 1)]
-        return assembled(self.title, stations, rng)
+        return place_stations(self.title, stations, rng)
 
 
 def _length(stations: Sequence[Station]) -> float:
@@ -60,13 +67,13 @@ def _length(stations: Sequence[Station]) -> float:
     return sum(station.length for station in stations) + _GAP * (len(stations) - 1) + 2 * _EDGE
 
 
-def assembled(title: str, stations: Sequence[Station], rng: np.random.Generator) -> Assembled:
+def place_stations(title: str, stations: Sequence[Station], rng: np.random.Generator) -> GeneratedAssembly:
     """Stations beside each other on one board."""
     length = _length(stations)
     placed = list[Station]()
     x = _EDGE - length / 2
     for station in stations:
-        placed.append(shifted(station, x + station.length / 2))
+        placed.append(shift_station(station, x + station.length / 2))
         x += station.length + _GAP
     bodies = [body for station in placed for body in station.bodies]
     ys = [float(np.abs(piece.corners[:, 1]).max()) for body in bodies for piece in body.pieces]
@@ -78,22 +85,22 @@ def assembled(title: str, stations: Sequence[Station], rng: np.random.Generator)
     for station in placed:
         parts |= station.parts
         fixed |= station.fixed
-    return Assembled(title, parts, fixed, merged(rng, [station.acts for station in placed]))
+    return GeneratedAssembly(title, parts, fixed, merge_orders(rng, [station.acts for station in placed]))
 
 
 _MOST = 4
 """Stations on a board."""
-_CORNER = Kind(corner, 1, 3)
-_PEG = Kind(peg, 1, 2)
-_POST = Kind(post, 1, 3)
-_COVERED = Kind(covered, 3, 9)
-_PINNED = Kind(pinned, 3, 5)
-_BRIDGED = Kind(bridged, 3, 9)
-_KEYED = Kind(keyed, 3, 6)
-_GROOVED = Kind(grooved, 3, 6)
-_CARRIED = Kind(carried, 3, 3)
-_CASTLED = Kind(castled, 3, 7)
-_THREADED = Kind(threaded, 2, 3)
+_CORNER = Kind(make_corner, 1, 3)
+_PEG = Kind(make_peg, 1, 2)
+_POST = Kind(make_post, 1, 3)
+_COVERED = Kind(make_covered, 3, 9)
+_PINNED = Kind(make_pinned, 3, 5)
+_BRIDGED = Kind(make_bridged, 3, 9)
+_KEYED = Kind(make_keyed, 3, 6)
+_GROOVED = Kind(make_grooved, 3, 6)
+_CARRIED = Kind(make_carried, 3, 3)
+_CASTLED = Kind(make_castled, 3, 7)
+_THREADED = Kind(make_threaded, 2, 3)
 _EVERY = (_CORNER, _PEG, _POST, _COVERED, _PINNED, _BRIDGED, _KEYED, _GROOVED, _CARRIED)
 
 FAMILIES: Mapping[str, Family] = {

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.scenario.generated.assembled import Assembled
+from apo_bench.scenario.generated.assembly import GeneratedAssembly
 from apo_bench.scenario.parts.making import Body
 
 _ARM = np.array([-420.0, 0.0])
@@ -34,7 +34,7 @@ class Table(NamedTuple):
     yaw_deg: float
 
 
-def lay(made: Assembled, rng: np.random.Generator) -> Table:
+def lay(made: GeneratedAssembly, rng: np.random.Generator) -> Table:
     """Draw where parts wait.
 
     Raises:

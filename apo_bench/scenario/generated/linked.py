@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembled import BOARD, Act, Station, between
+from apo_bench.scenario.generated.assembly import BOARD, Act, Station, between
 from apo_bench.scenario.generated.bodies import (
     PIN,
     TOP,
@@ -20,21 +20,21 @@ from apo_bench.scenario.generated.bodies import (
     upright,
     upright_wall,
 )
-from apo_bench.scenario.generated.stations import LETTERS, LOW, WALL, head, hold, pile, plates_on
+from apo_bench.scenario.generated.stations import LETTERS, LOW, WALL, head, hold, make_pile, make_plates
 from apo_bench.scenario.parts.making import Body, bore, extrude, join, polygon, rectangle
 
 _FOOT = 32.0
 """How far the foot of a bracket reaches from its wall."""
 
 
-def pinned(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
     """Plates that lie anywhere on each other until two axles go through all of them."""
     radius = between(rng, 5, 6)
     apart = between(rng, 17, 20)
     width = 2 * apart + 2 * radius + 16
     pins = [Pin(x, 0, radius, letter) for x, letter in ((-apart, "a"), (apart, "b"))]
     heights = [between(rng, 14, 16) for _ in range(size - 2)]
-    parts, acts = plates_on(rng, i, width, (34, 42), heights, pins)
+    parts, acts = make_plates(rng, i, width, (34, 42), heights, pins)
     plates = list(parts)
     deep = TOP + sum(heights) - LOW
     neck = between(rng, 24, 28)
@@ -49,7 +49,7 @@ def pinned(rng: np.random.Generator, i: str, size: int) -> Station:
     return Station(width, parts, tuple(acts), bores=tuple(bores))
 
 
-def bridged(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two or three towers that stand anywhere, plates over the pins of each two, blocks on these plates."""
     count = 3 if size >= 5 and (size > 6 or rng.random() < 0.7) else 2
     pitch = between(rng, 66, 72)
@@ -77,7 +77,7 @@ def bridged(rng: np.random.Generator, i: str, size: int) -> Station:
         on = [pair for tower, side, _ in ends for pair in (("bottom", f"{tower}.top"), (side, f"{tower}.{side}"))]
         middle = ((xs[k] + xs[k + 1]) / 2, 0.0, TOP + height)
         acts.append(Act(name, middle, tuple(on), hold(thick)))
-        more, piled = pile(rng, name, (*middle[:2], middle[2] + thick), caps)
+        more, piled = make_pile(rng, name, (*middle[:2], middle[2] + thick), caps)
         parts |= more
         acts += piled
     return Station(pitch * (count - 1) + width, parts, tuple(acts))
@@ -95,12 +95,12 @@ class Way(NamedTuple):
     """Faces of the key, and those of the rails."""
 
 
-def keyed(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_keyed(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two keys that may be anywhere along a slot, a bar over the pins of both, blocks on the bar."""
     return _barred(rng, i, size, _slot)
 
 
-def grooved(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_grooved(rng: np.random.Generator, i: str, size: int) -> Station:
     """The same with keys whose tilted faces lie in a groove."""
     return _barred(rng, i, size, _groove)
 
@@ -157,12 +157,12 @@ def _barred(
     parts[bar] = block(2 * apart + 20, between(rng, 24, 30), thick, [PIN] if size > 3 else [], holes)
     pairs = [pair for _, e in ends for pair in (("bottom", f"key{i}{e}.top"), (f"bore{e}", f"key{i}{e}.pin"))]
     acts.append(Act(bar, (0, 0, z), tuple(pairs), hold(thick)))
-    more, piled = pile(rng, bar, (0, 0, z + thick), size - 3)
+    more, piled = make_pile(rng, bar, (0, 0, z + thick), size - 3)
     rails = tuple(rail.prefixed(f"way{i}_") for rail in way.rails)
     return Station(2 * apart + length + 6, parts | more, (*acts, *piled), bodies=rails)
 
 
-def castled(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two or three blocks with slots that stand anywhere, a stick laid into all of them, saddles over the stick."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(3, size - 1) + 1))
     pitch = between(rng, 70, 74)
@@ -195,7 +195,7 @@ def castled(rng: np.random.Generator, i: str, size: int) -> Station:
     return Station(pitch * (count - 1) + length, parts, tuple(acts))
 
 
-def threaded(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
     """Brackets that stand anywhere, and a rod that is pushed, level, through the wall of the board and all of them."""
     count = size - 1
     radius = between(rng, 7, 8)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, require_known
-from apo_bench.scenario.generated.assembled import Assembled
+from apo_bench.scenario.generated.assembly import GeneratedAssembly
 from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.scenario.generated.laying import lay
 from apo_bench.scenario.generated.writing import write
@@ -20,12 +20,12 @@ _NAME = re.compile(r"generated:(?:([a-z-]+):)?(\d{1,15})")
 
 
 def is_generated(name: object) -> bool:
-    """Whether a name is meant as that of a generated assembly."""
+    """Return whether a name is meant as that of a generated assembly."""
     return isinstance(name, str) and name.startswith(_PREFIX)
 
 
 def whole_name(name: str) -> str:
-    """The name with its family: of `generated:SEED` that which the seed draws.
+    """Return the name with its family: of `generated:SEED` that which the seed draws.
 
     Raises:
         InputError: No such family, or no such seed.
@@ -46,16 +46,16 @@ def whole_name(name: str) -> str:
 
 
 def generated_file(name: str) -> Path:
-    """The scenario file of a generated assembly, in a folder that lasts as long as this process.
+    """Return the scenario file of a generated assembly, in a folder that lasts as long as this process.
 
     Raises:
         InputError: No such family, or no such seed.
     """
-    return _written(whole_name(name))
+    return _write_once(whole_name(name))
 
 
 @lru_cache(maxsize=1024)
-def _written(name: str) -> Path:
+def _write_once(name: str) -> Path:
     folder = Path(_folder().name) / name.replace(":", "_")
     folder.mkdir()
     return write_generated(name, folder)
@@ -67,22 +67,20 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
 
 
 def write_generated(name: str, folder: Path) -> Path:
-    """Write the files of a generated assembly; returns that of the scenario."""
-    _, family, seed = whole_name(name).split(":")
-    made, rng = _drawn(family, int(seed))
-    return write(made, lay(made, rng), folder, f"{family}_{seed}")
+    """Write the files of a generated assembly, and return that of the scenario."""
+    assembly, rng = generate_assembly(name)
+    return write(assembly, lay(assembly, rng), folder, "_".join(whole_name(name).split(":")[1:]))
 
 
-def drawn(name: str) -> Assembled:
-    """A generated assembly without a table.
+def generate_assembly(name: str) -> tuple[GeneratedAssembly, np.random.Generator]:
+    """Generate an assembly without a table.
+
+    Returns:
+        The assembly, and the generator that draws its table next.
 
     Raises:
         InputError: No such family, or no such seed.
     """
     _, family, seed = whole_name(name).split(":")
-    return _drawn(family, int(seed))[0]
-
-
-def _drawn(family: str, seed: int) -> tuple[Assembled, np.random.Generator]:
-    rng = np.random.default_rng([seed, _ASSEMBLY_STREAM, *family.encode()])
+    rng = np.random.default_rng([int(seed), _ASSEMBLY_STREAM, *family.encode()])
     return FAMILIES[family].draw(rng), rng

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembled import BOARD, Act, Point, Station, between
+from apo_bench.scenario.generated.assembly import BOARD, Act, Point, Station, between
 from apo_bench.scenario.generated.bodies import COLLAR, PIN, TOP, Pin, axle, block, box, ring, upright
 from apo_bench.scenario.parts.making import Body, bore
 
@@ -29,7 +29,7 @@ def head(deep: float, neck: float) -> Point:
     return (0.0, 0.0, deep + COLLAR + neck - 10.0)
 
 
-def corner(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
     """A block in a corner of two walls, others on top of it."""
     width = between(rng, 32, 40)
     depth = between(rng, 28, 34)
@@ -44,11 +44,11 @@ def corner(rng: np.random.Generator, i: str, size: int) -> Station:
     acts = (Act(name, (0, 0, TOP), contacts, hold(height)),)
     is_loose = size > 1 and bool(rng.random() < _LOOSE)
     parts = {name: block(width, depth, height, [PIN] if size - is_loose > 1 else [])}
-    more, piled = pile(rng, name, (0, 0, TOP + height), size - 1, is_loose)
+    more, piled = make_pile(rng, name, (0, 0, TOP + height), size - 1, is_loose)
     return Station(width + 2 * WALL, parts | more, (*acts, *piled), bodies=walls)
 
 
-def pile(
+def make_pile(
     rng: np.random.Generator, below: str, at: Point, count: int, loose: bool = False
 ) -> tuple[dict[str, Body], list[Act]]:
     """Blocks on each other, each on the pin of the one below it.
@@ -75,15 +75,15 @@ def pile(
     return parts, acts
 
 
-def peg(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_peg(rng: np.random.Generator, i: str, size: int) -> Station:
     """An axle in a bore of the board, and a ring over it."""
     radius = between(rng, 5, 7)
-    parts, acts = ringed_axle(rng, i, radius)
+    parts, acts = make_ringed_axle(rng, i, radius)
     bores = (bore((0, 0), radius, 0, TOP, f"bore{i}", fit=True),)
     return Station(50.0, dict([*parts.items()][:size]), acts[:size], bores=bores)
 
 
-def ringed_axle(rng: np.random.Generator, i: str, radius: float) -> tuple[dict[str, Body], tuple[Act, ...]]:
+def make_ringed_axle(rng: np.random.Generator, i: str, radius: float) -> tuple[dict[str, Body], tuple[Act, ...]]:
     """An axle that its collar stops on the board, and a ring on its neck."""
     collar = radius + between(rng, 4, 6)
     deep = TOP - LOW
@@ -98,7 +98,7 @@ def ringed_axle(rng: np.random.Generator, i: str, radius: float) -> tuple[dict[s
     )
 
 
-def post(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_post(rng: np.random.Generator, i: str, size: int) -> Station:
     """Plates over one post of the board, or over two."""
     two = bool(rng.random() < 0.5)
     radius = between(rng, 5, 7)
@@ -108,13 +108,13 @@ def post(rng: np.random.Generator, i: str, size: int) -> Station:
     apart = between(rng, 15, 17)
     at = ((-apart, "a"), (apart, "b")) if two else ((0.0, "a"),)
     posts = [Pin(x, 0, radius, f"post{i}{letter}", high) for x, letter in at]
-    parts, acts = plates_on(rng, i, width, (30, 40), heights, posts)
+    parts, acts = make_plates(rng, i, width, (30, 40), heights, posts)
     on = tuple((f"bore{pin.name[-1]}", f"{BOARD}.{pin.name}") for pin in posts)
     threaded = (act._replace(contacts=(*act.contacts, *on)) for act in acts)
     return Station(width, parts, tuple(threaded), bodies=tuple(upright(each, TOP) for each in posts))
 
 
-def plates_on(
+def make_plates(
     rng: np.random.Generator,
     i: str,
     width: float,
@@ -137,7 +137,7 @@ def plates_on(
     return parts, acts
 
 
-def covered(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two to four axles in bores of the board, a cover over all of them, rings on the cover."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(4, size - 1) + 1))
     ringed = {int(k) for k in rng.permutation(count)[: size - 1 - count]}
@@ -170,10 +170,10 @@ def covered(rng: np.random.Generator, i: str, size: int) -> Station:
     return Station(pitch * (count - 1) + 46, parts, tuple(acts), bores=bores)
 
 
-def carried(rng: np.random.Generator, i: str, size: int) -> Station:
+def make_carried(rng: np.random.Generator, i: str, size: int) -> Station:
     """An axle that gets its ring in a stand beside the board, and then carries it to its bore; three parts."""
     radius = between(rng, 5, 7)
-    parts, (first, second) = ringed_axle(rng, i, radius)
+    parts, (first, second) = make_ringed_axle(rng, i, radius)
     stand = f"stand{i}"
     aside = 80.0
     standing = (("side", f"{stand}.bore"), ("shoulder", f"{stand}.top"))

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.io import write_file
-from apo_bench.scenario.generated.assembled import Assembled
+from apo_bench.scenario.generated.assembly import GeneratedAssembly
 from apo_bench.scenario.generated.laying import Table
 from apo_bench.scenario.parts.making import Body, write_part
 
@@ -26,7 +26,7 @@ _COLORS = (
 )
 
 
-def write(made: Assembled, table: Table, folder: Path, name: str) -> Path:
+def write(made: GeneratedAssembly, table: Table, folder: Path, name: str) -> Path:
     """Write the files of an assembly; returns that of the scenario."""
     files = _stems(made.parts)
     for part, stem in files.items():
@@ -45,7 +45,7 @@ def _stems(parts: Mapping[str, Body]) -> Mapping[str, str]:
     return {name: first.setdefault(id(body), name) for name, body in parts.items()}
 
 
-def _lines(made: Assembled, table: Table, files: Mapping[str, str]) -> Iterable[str]:
+def _lines(made: GeneratedAssembly, table: Table, files: Mapping[str, str]) -> Iterable[str]:
     yield from ("schema = 1", f'title = "{made.title}"', 'paper = "generated"', "clearance_mm = 0.25", "gap_mm = 0.1")
     yield from ("", "[parts.table]", 'file = "table"', "fixed = true")
     for k, part in enumerate(made.parts):

@@ -1,6 +1,6 @@
 """Part files become solids with named faces."""
 
 from apo_bench.scenario.parts.load import load_part, part_names, part_path
-from apo_bench.scenario.parts.part_file import PartFile, part_files_of, read_part
+from apo_bench.scenario.parts.part_file import PartFile, read_part
 
-__all__ = ["PartFile", "load_part", "part_files_of", "part_names", "part_path", "read_part"]
+__all__ = ["PartFile", "load_part", "part_names", "part_path", "read_part"]

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -11,7 +10,6 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry import (
     SAGITTA_M,
-    WHOLE_TURN,
     Array,
     Face,
     Piece,
@@ -58,7 +56,6 @@ def check_faces(solid: Solid, path: Path) -> float:
     """
     for name, flat in solid.faces.items():
         _check_flat(flat, solid.pieces, f"{path}, faces, {name}")
-    _check_once(solid, path)
     return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
 
 
@@ -131,38 +128,6 @@ def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
     return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull
 
 
-def _check_once(solid: Solid, path: Path) -> None:
-    """Refuse faces that lie on each other."""
-    by_plane: dict[tuple[float, ...], list[Face]] = {}
-    for face in solid.faces.values():
-        key = tuple(np.round([*face.normal, 1e-1 * face.plane[3] / _IN_PLANE_M], 4) + 0.0)
-        by_plane.setdefault(key, []).append(face)
-    for faces in by_plane.values():
-        for a, b in combinations(faces, 2):
-            to_plane = plane_across(a.normal)
-            areas = [flat_area(f.outline, f.holes, to_plane) for f in (a, b)]
-            if areas[0].intersection(areas[1]).buffer(-_BESIDE_M).area > 0.0:
-                _fail(f"{path}, faces, {b.name}", f"the face lies on '{a.name}', so state one of them")
-    for r, s in combinations(solid.rounds.values(), 2):
-        if _same_wall(r, s):
-            _fail(f"{path}, faces, {s.name}", f"the face lies on '{r.name}', so state one of them")
-
-
-def _same_wall(a: RoundFace, b: RoundFace) -> bool:
-    """Whether two whole turns of wall, or two rims, are in one place."""
-    if a.kind != b.kind or a.hole != b.hole or abs(a.axis @ b.axis) < 1.0 - _PARALLEL:
-        return False
-    if min(a.extent_rad, b.extent_rad) < WHOLE_TURN - 1e-9:
-        return False
-    off = b.middle - a.middle
-    along = float(off @ a.axis)
-    return bool(
-        np.linalg.norm(off - along * a.axis) < _IN_PLANE_M
-        and abs(a.radius + a.slope * along - b.radius) < _IN_PLANE_M
-        and abs(along) < (a.length + b.length) / 2 + _IN_PLANE_M * (1.0 if a.kind == "rim" else -1.0)
-    )
-
-
 def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
     """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
     heights, radii = _samples(wall)
@@ -232,4 +197,4 @@ def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Arr
 
 
 def _fail(place: str, what: str) -> NoReturn:
-    raise InputError(f"{place}: {what}; state the face as the pieces are, or mend the pieces.")
+    raise InputError(f"{place}: {what}; state the face as the pieces are, or correct the pieces.")

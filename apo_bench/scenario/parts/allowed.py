@@ -11,10 +11,8 @@ THINNEST_M = 0.0005
 """Half of the least thickness of a box or a cylinder."""
 WIDEST_M = 0.1
 """Largest radius of a cylinder, which is cut into sides."""
-MOST_BOXES = 100
-"""Of a part of boxes alone."""
 MOST_PIECES = 2000
-"""Of any other part."""
+"""Of a part."""
 MOST_CORNERS_IN_ALL = 40_000
 """Of all pieces of a part."""
 MOST_FACES = 1000

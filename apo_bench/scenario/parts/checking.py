@@ -1,7 +1,6 @@
 """Check what is stated of a part against its pieces: one solid, with these faces and this matter."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -40,12 +39,6 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
         raise InputError(f"{file}, inertia_mm5: that of the pieces about their centroid is [{six}]; state that.")
 
 
-def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
-    """Raise an `InputError` unless every piece touches the others, over some of them."""
-    count = len(touching_groups(pieces))
-    require(count <= 1, f"{path}: the pieces make {count} separate solids; a part is one rigid piece.")
-
-
 def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
     """Which pieces touch each other, over some of them."""
     from scipy.cluster.hierarchy import DisjointSet
@@ -71,7 +64,8 @@ def _gap(a: Piece, b: Piece) -> float:
 def check_part(file: PartFile, solid: Solid) -> None:
     """Raise an `InputError` unless what is stated of a part is so of its pieces."""
     if file.stated is not None:
-        check_one_piece(solid.pieces, file.path)
-        beside = file.path.with_suffix(".toml")
-        check_matter(solid, str(beside), check_faces(solid, beside))
-        check_receding(solid, beside)
+        count = len(touching_groups(solid.pieces))
+        require(count == 1, f"{file.path}: the pieces make {count} separate solids; a part is one rigid piece.")
+        stated = file.path.with_suffix(".toml")
+        check_matter(solid, str(stated), check_faces(solid, stated))
+        check_receding(solid, stated)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Box, polygons_of, rings_of, straightened
+from apo_bench.geometry import Array, Box, polygons_of, rings_of, straighten
 
 _SAME_PLANE_M = 1e-9
 """Sides of boxes this near to each other lie in one plane."""
@@ -46,7 +46,7 @@ class Surface(NamedTuple):
         return tuple(map(self._lifted, rings_of(self.shape, self.sign)))
 
     def _lifted(self, ring: Array) -> Array:
-        flat = straightened(ring)
+        flat = straighten(ring)
         flat = np.roll(flat, -np.lexsort(flat.T[::-1])[0], axis=0)
         out = np.empty((len(flat), 3))
         out[:, self.axis] = self.height

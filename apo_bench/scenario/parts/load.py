@@ -1,8 +1,7 @@
 """A part file becomes a solid with named faces."""
 
+from collections import Counter
 from pathlib import Path
-
-import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Box, Face, Solid
@@ -86,23 +85,23 @@ def _united(file: PartFile) -> Solid:
         len(union.surfaces) <= MOST_FACES,
         f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.",
     )
-    marks = _matched(file, union.surfaces)
-    faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
+    marks = dict[int, Mark]()
+    for each in file.marks:
+        k = _under(file, each, union.surfaces)
+        require(
+            k not in marks, f"{file.path}: site '{each.name}' lies on a face that another one marks; keep one of them."
+        )
+        marks[k] = each
+    counts = Counter[int]()
+    faces = list[Face]()
+    for k, surface in enumerate(union.surfaces):
+        counts[surface.side] += 1
+        outline, *holes = surface.rings()
+        mark = marks.get(k)
+        name = mark.name if mark else f"auto_{SIDES[surface.side]}_{counts[surface.side]}"
+        faces.append(Face(name, outline, tuple(holes), fit=bool(mark and mark.fit)))
     faces.sort(key=lambda face: face.name.startswith("auto_"))
     return Solid(file.path.stem, {face.name: face for face in faces}, boxes, union.centroid, union.volume)
-
-
-def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:
-    """Which mark lies on which surface."""
-    marks: dict[int, Mark] = {}
-    for mark in file.marks:
-        k = _under(file, mark, surfaces)
-        if k in marks:
-            raise InputError(
-                f"{file.path}: sites '{marks[k].name}' and '{mark.name}' lie on one face; keep one of them."
-            )
-        marks[k] = mark
-    return marks
 
 
 def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
@@ -121,14 +120,3 @@ def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
         )
         return k
     raise InputError(f"{file.path}: site '{mark.name}' at ({where}) mm lies on no face; move it onto the surface.")
-
-
-def _number(surfaces: tuple[Surface, ...], k: int) -> int:
-    """The place of a surface among those that look the same way, counted from 1, named or not."""
-    return 1 + sum(surface.side == surfaces[k].side for surface in surfaces[:k])
-
-
-def _face(surface: Surface, mark: Mark | None, number: int) -> Face:
-    outline, *holes = surface.rings()
-    name = mark.name if mark else f"auto_{SIDES[surface.side]}_{number}"
-    return Face(name, np.asarray(outline), tuple(holes), fit=bool(mark and mark.fit))

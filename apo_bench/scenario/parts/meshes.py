@@ -11,12 +11,9 @@ _SAME_M = 1e-7
 """Corners nearer to each other are one; a corner this far inside of the piece is none."""
 _THINNEST_M = 1e-5
 """A piece is thicker than this across each of its sides."""
-_MOST_SIDES = 330
-_MOST_DIRECTIONS = 200
-"""Of edges of one piece: how deep two pieces are in each other is computed along each pair of directions."""
 
 
-def checked_hull(path: Path, name: str, corners: Array) -> Hull:
+def make_hull(path: Path, name: str, corners: Array) -> Hull:
     """The piece with these corners, (k, 3), [m].
 
     Raises:
@@ -34,10 +31,6 @@ def checked_hull(path: Path, name: str, corners: Array) -> Hull:
     require(
         below.max(axis=0).min() >= _THINNEST_M,
         f"{path}: piece '{name}' is flat: a piece is thicker than {1e3 * _THINNEST_M:g} mm across each side.",
-    )
-    require(
-        len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS,
-        f"{path}: piece '{name}' has more than {_MOST_SIDES} sides or {_MOST_DIRECTIONS} directions of edges; cut it.",
     )
     inside = below.min(axis=1)
     require(

@@ -13,14 +13,12 @@ from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_
 from apo_bench.scenario.parts.allowed import (
     DENSITY,
     LARGEST_M,
-    MOST_BOXES,
-    MOST_CORNERS_IN_ALL,
     MOST_PIECES,
     THINNEST_M,
     WIDEST_M,
     is_name,
 )
-from apo_bench.scenario.parts.meshes import checked_hull
+from apo_bench.scenario.parts.meshes import make_hull
 from apo_bench.scenario.parts.stated import StatedPart, read_stated_part
 
 if TYPE_CHECKING:
@@ -67,11 +65,6 @@ class PartFile:
         return self.path, *pictures, *(() if self.stated is None else (self.path.with_suffix(".toml"),))
 
 
-def part_files_of(path: Path) -> tuple[Path, ...]:
-    """The files that a part is made of; see `PartFile.files`."""
-    return read_part(path).files
-
-
 def read_part(path: Path) -> PartFile:
     """Read a part file; once, as long as it and the file beside it stay as they are.
 
@@ -96,8 +89,6 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
 
     model = read_part_model(path)
     require(0 < len(model.geoms) <= MOST_PIECES, f"{path}: a part has 1 to {MOST_PIECES} geoms, named pieces.")
-    count = sum(len(geom.corners) for geom in model.geoms)
-    require(count <= MOST_CORNERS_IN_ALL, f"{path}: a part has at most {MOST_CORNERS_IN_ALL} corners, not {count}.")
     for name in (*(geom.name for geom in model.geoms), *(site.name for site in model.sites)):
         require(is_name(name), f"{path}: '{name[:64]}' is no name: a letter, then letters, digits and _.")
     pieces = tuple(_piece(path, geom) for geom in model.geoms)
@@ -105,13 +96,15 @@ def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
         return _of_boxes(path, model, pieces)
     require(not model.sites, f"{path}: sites name faces of boxes alone; state faces in {path.stem}.toml.")
     stated = read_stated_part(path.with_suffix(".toml"))
-    geoms = tuple(_with_matter(geom, stated) for geom in model.geoms)
-    return PartFile(path, pieces, (), stated, stated.density, replace(model, geoms=geoms))
+    geoms = []
+    for geom in model.geoms:
+        sliding, turning, rolling = (*stated.friction, *geom.friction[len(stated.friction) :])
+        geoms.append(replace(geom, density=stated.density, friction=(sliding, turning, rolling)))
+    return PartFile(path, pieces, (), stated, stated.density, replace(model, geoms=tuple(geoms)))
 
 
 def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFile:
     """A part of boxes alone."""
-    require(len(pieces) <= MOST_BOXES, f"{path}: a part of boxes has at most {MOST_BOXES}, not {len(pieces)}.")
     densities = {geom.density for geom in model.geoms}
     require(
         len(densities) == 1 and DENSITY[0] <= min(densities) <= DENSITY[1],
@@ -123,18 +116,12 @@ def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFi
     return PartFile(path, tuple(pieces), marks, None, min(densities), model)
 
 
-def _with_matter(geom: "PartGeom", stated: StatedPart) -> "PartGeom":
-    """A geom with density and friction of the file beside the part."""
-    sliding, turning, rolling = (*stated.friction, *geom.friction[len(stated.friction) :])
-    return replace(geom, density=stated.density, friction=(sliding, turning, rolling))
-
-
 def _piece(path: Path, geom: "PartGeom") -> Piece:
     """The piece of a geom."""
     place = f"{path}: geom '{geom.name}'"
     if geom.kind == "mesh":
         require(len(geom.corners) >= 4 and np.abs(geom.corners).max() <= LARGEST_M, f"{place} needs 4 corners or more.")
-        return checked_hull(path, geom.name, geom.corners)
+        return make_hull(path, geom.name, geom.corners)
     size = geom.size if geom.kind == "box" else geom.size[:2]
     thick = size.min() >= THINNEST_M and size.max() <= LARGEST_M
     require(

@@ -27,6 +27,7 @@ _Length = Annotated[float, Meta(ge=-_LARGEST_MM, le=_LARGEST_MM)]
 _Point = tuple[_Length, _Length, _Length]
 _Radius = Annotated[float, Meta(ge=_THINNEST_RADIUS_MM, le=_LARGEST_MM)]
 _EndRadius = Annotated[float, Meta(ge=0.0, le=_LARGEST_MM)]
+_Friction = Annotated[float, Meta(ge=0.0, le=10.0)]
 _Ring = Annotated[list[_Point], Meta(min_length=3)]
 
 
@@ -84,7 +85,7 @@ class MatterTable(Table, frozen=True, kw_only=True):
     inertia_mm5: tuple[Finite, Finite, Finite, Finite, Finite, Finite]
     title: Text = ""
     density: Annotated[float, Meta(ge=DENSITY[0], le=DENSITY[1])] = USUAL_DENSITY
-    friction: float | tuple[float, ...] = ()
+    friction: _Friction | Annotated[tuple[_Friction, ...], Meta(max_length=3)] = ()
     source: Text = ""
     licence: Text = ""
 
@@ -125,7 +126,7 @@ def read_stated_part(path: Path) -> StatedPart:
         centroid=1e-3 * np.array(top.centroid_mm),
         inertia=1e-15 * _inertia(top.inertia_mm5, f"{path}, inertia_mm5"),
         density=top.density,
-        friction=_friction(top.friction, f"{path}, friction"),
+        friction=top.friction if isinstance(top.friction, tuple) else (top.friction,),
         title=top.title,
     )
 
@@ -207,13 +208,3 @@ def _inertia(six: tuple[float, ...], place: str) -> Array:
     solid = np.abs(J).max() < 1e30 and np.linalg.eigvalsh(J)[0] > 0.0
     require(solid, f"{place}: xx, yy, zz, xy, xz, yz of a solid are needed.")
     return J
-
-
-def _friction(stated: float | tuple[float, ...], place: str) -> tuple[float, ...]:
-    """One to three numbers; none if the file states none."""
-    numbers = stated if isinstance(stated, tuple) else (stated,)
-    most = (10.0, 0.1, 0.1)
-    least = (0.01, 0.0, 0.0)
-    holds = len(numbers) <= 3 and all(a <= x <= b for a, x, b in zip(least, numbers, most, strict=False))
-    require(holds, f"{place}: 1 to 3 numbers of 0.01 to 10, 0 to 0.1, 0 to 0.1 are needed.")
-    return tuple(map(float, numbers))

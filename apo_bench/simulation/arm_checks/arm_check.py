@@ -1,12 +1,6 @@
-"""What an arm can do at the table, in numbers: reach, errors of its tip, stiffness, gripper, room along a plan.
+"""Check what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
 
-Where a base or the site could stand so that an arm reaches a whole scenario.
-"""
-
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -15,12 +9,20 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.plan_check import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise, trace
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.kinematics import Kinematics, tip_down, with_home
+from apo_bench.simulation.arms.home import tip_down
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution import key_angles, moves
-from apo_bench.simulation.robot import Halt, Robot, shifted, smooth, steady, turn_from
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+    turn_from,
+)
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
@@ -31,12 +33,7 @@ _PUSH_N = 5.0
 _PUSH_S = 0.5
 """Stiffness is looked at by this push, which lasts so long."""
 _LAYOUTS = 20
-_MOST_GIVING_M = 0.002
 _LEAST_MARGIN_DEG = 5.0
-_MOST_TURN_DEG = 5.0
-_LEAST_EVENNESS = 0.3
-"""Of two pads on a part that stands fast between them; hands that held parts well had 0.45 at least."""
-_LEVER_M = 0.1
 
 
 @final
@@ -91,7 +88,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     if across > scene.clearance_mm:
         missing.append(
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; "
-            f"{_softest(scene)}, or make the clearance larger."
+            "give its motors more 'armature' in the MJCF, so that its servos get stiffer, or make the clearance larger."
         )
     if force < LEAST_FORCE_N:
         missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
@@ -122,18 +119,6 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     )
 
 
-def _softest(scene: Scene) -> str:
-    """Which joint gives way most, pushed at the tip or turned there by as much 0.1 m farther, and what would help."""
-    J = np.array(scene.kinematics.jacobian(scene.arm.home))
-    gains = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
-    J[3:] *= _LEVER_M
-    k = int(((J**2).sum(axis=0) / gains).argmax())
-    return (
-        f"the joint '{scene.arm.joints[k]}' gives way most ({gains[k]:.0f} Nm/rad): its servo gets stiffer with the "
-        "'armature' of its motor in the MJCF"
-    )
-
-
 def unsaid(arm: Arm) -> list[str]:
     """What a file could say and does not, and what is wrong with the gripper that was measured."""
     missing = []
@@ -145,22 +130,6 @@ def unsaid(arm: Arm) -> list[str]:
         missing.append("the torque of a joint has no limit in the model; state 'torque_nm'.")
     if arm.hand is not None and not arm.hand.graded:
         missing.append("the gripper knows open and closed only: it opens fully beside other parts.")
-    if arm.hand is not None and arm.hand.gives_m > _MOST_GIVING_M:
-        missing.append(
-            f"the fingers give way by {1e3 * arm.hand.gives_m:.1f} mm on a part of half their opening, so it is lost; "
-            "take a gripper whose linkage is stiff, or a softer 'closed'."
-        )
-    if arm.hand is not None and arm.hand.evenness < _LEAST_EVENNESS:
-        missing.append(
-            f"of two pads on a part the weaker pushes {100 * arm.hand.evenness:.0f} % as hard as the other, so the "
-            "part is moved aside: the coupling of the fingers gives way; give its <equality> a stiffer 'solref', or "
-            "drive both fingers."
-        )
-    if arm.hand is not None and arm.hand.turns_deg > _MOST_TURN_DEG:
-        missing.append(
-            f"the pads turn by {arm.hand.turns_deg:.1f} degrees while the gripper closes to half, so that they hold by "
-            "their edges; take a gripper that keeps its pads parallel."
-        )
     return missing
 
 
@@ -185,19 +154,23 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
             rise(robot, 0.3)
             for i, speed in enumerate(SPEEDS):
                 way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-                end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
-                line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
-                errors.append(error_on(line, robot.trace(line), speed))
+                end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+                line = (
+                    smooth_trajectory(robot.T, end, speed)
+                    if speed == SPEEDS[-1]
+                    else steady_trajectory(robot.T, end, speed)
+                )
+                errors.append(error_on(line, trace(robot, line), speed))
                 robot.wait(STAND_S)
-            rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
-            before = _pushed(robot, np.zeros(3))
-            x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
-    except Halt:
+            rest = float(np.linalg.norm(_push(robot, np.zeros(3)) - robot.T[:3, 3]))
+            before = _push(robot, np.zeros(3))
+            x, y, z = (1e3 * abs(float((_push(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+    except ExecutionAborted:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
 
 
-def _pushed(robot: Robot, force: Array) -> Array:
+def _push(robot: Robot, force: Array) -> Array:
     """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force
@@ -223,38 +196,3 @@ def _margins(scene: Scene, plan: Plan) -> Array:
             return np.full(len(least), np.nan)
         least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in angles.reached], axis=0))
     return np.degrees(least)
-
-
-_BASES_M = tuple(product((0.0, 0.1, 0.2), (-0.45, -0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1)))
-"""Height and place behind the middle of the table."""
-_NEARER_M = (0.04, 0.08, 0.12)
-_NARROWER = 0.5
-"""How much nearer to the arm the site may be, which then is narrower."""
-
-
-def place_in_reach(scene: Scene, reaches: Callable[[Scene], bool]) -> str:
-    """What to state so that all is in reach, for the file of the arm or of the scenario; empty where nothing is found.
-
-    Args:
-        reaches: Whether the arm of a scene reaches its scenario.
-    """
-    return next((text for text, nearer in _places(scene) if reaches(nearer)), "")
-
-
-def _places(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """The arm elsewhere, then the site nearer to where it is."""
-    for z, x in _BASES_M if scene.arm.hand is not None else ():
-        with suppress(InputError):
-            arm = with_home(replace(scene.arm, base=(x, 0.0, z)), base_is_stated=True)
-            home = ", ".join(f"{angle:.1f}" for angle in np.degrees(arm.home))
-            text = f"base = {{ at_mm = [{1e3 * x:g}, 0, {1e3 * z:g}] }} and home_deg = [{home}]"
-            moved = replace(scene, arm=arm, kinematics=Kinematics(arm))
-            yield f"all is in reach with {text} in the file of the arm", moved
-    site = scene.scenario.site
-    for by in _NEARER_M:
-        x, y = site.center_m
-        spread = (_NARROWER * site.spread_m[0], _NARROWER * site.spread_m[1])
-        nearer = replace(site, center_m=(x - by, y), spread_m=spread)
-        numbers = ", ".join(f"{1e3 * v:g}" for v in nearer.center_m), ", ".join(f"{1e3 * v:g}" for v in spread)
-        text = f"site: all is in reach with center_mm = [{numbers[0]}], spread_mm = [{numbers[1]}]"
-        yield text, replace(scene, scenario=replace(scene.scenario, site=nearer))

@@ -1,18 +1,15 @@
-"""What an arm makes of a plan before it moves: reach, room to the limits of joints, room of the gripper, tip error.
-
-How far the tip of an arm is off its line at a speed, found by trying.
-"""
+"""Predict what an arm makes of a plan: reach, room to the limits of joints, room of the gripper, tip error."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal, cast, final
+from typing import Literal, cast
 
 import mujoco
 import numpy as np
 
 from apo_bench.assembly import Plan, Poses
-from apo_bench.geometry import Array, Solid, intrusion_depths, pose, remembered
+from apo_bench.geometry import Array, Solid, intrusion_depths, pose
 from apo_bench.planning.prediction.measures import ArmMove
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
@@ -25,90 +22,11 @@ from apo_bench.simulation.execution import (
     key_angles,
     moves,
 )
-from apo_bench.simulation.robot import Halt, Robot, Trajectory, gripper_boxes, shifted, smooth, steady
+from apo_bench.simulation.robot import gripper_boxes
 from apo_bench.simulation.scene import Scene
 
-SPEEDS = (0.01, 0.06, 0.5)
-"""[m/s], at which the robot touches, inserts, and carries."""
-_HIGH_M = 0.35
-"""Height at which errors are looked at, where the arm reaches it; else at that of its home."""
-_AHEAD_M = 0.25
-"""Farther ahead of its base than this: a line beside its axis turns it fast."""
-WAY_M = 0.15
-"""Length of the way along which they are looked at."""
-STAND_S = 0.3
-"""How long the arm stands before it."""
-_RESTS_M = 2e-5
-_LOOKS = 10
-"""It stands so much longer, as often as this, until the tip is where it shall be: weak joints swing behind."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class TipError:
-    """How far the tip is off where it should be at a speed."""
-
-    speed: float
-    """[m/s]"""
-    across_mm: float
-    """At most, beside the line."""
-    along_mm: float
-    turn_deg: float
-    tilt_deg: float
-    """How much of the turn the way ahead of the tip turns by; the rest is about that."""
-
-
-@remembered
-def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
-    """The error of the tip of an empty hand in free air at a speed [m/s]; None where it has no way there.
-
-    It is found by trying, once for a scene.
-    """
-    robot = Robot(scene, scene.scenario.start)
-    try:
-        with robot.watch_stability():
-            rise(robot, SPEEDS[-1])
-            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-            line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
-            return error_on(line, robot.trace(line), speed)
-    except Halt:
-        return None
-
-
-def rise(robot: Robot, speed: float) -> None:
-    """Go to where errors are looked at, at a speed [m/s], and come to rest there."""
-    up = np.array(robot.T)
-    up[0, 3] = max(up[0, 3], robot.arm.base[0] + _AHEAD_M)
-    up[2, 3] = _HIGH_M
-    if robot.scene.kinematics.inverse(up, robot.q) is None:
-        up[2, 3] = robot.T[2, 3]
-    if np.abs(up - robot.T).max() > 0.0:
-        robot.trace(smooth(robot.T, up, speed))
-    robot.wait(STAND_S)
-    looks = 0
-    while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
-        robot.wait(STAND_S)
-        looks += 1
-
-
-def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
-    """Of where the tip was at each step, (n, 4, 4): beside the line, along it behind the command, and turned."""
-    way = line.end[:3, 3] - line.start[:3, 3]
-    way = way / np.linalg.norm(way)
-    n = len(tips)
-    commanded = line.poses(line.progress(np.arange(1, n + 1) / n))
-    off = tips[:, :3, 3] - commanded[:, :3, 3]
-    along = off @ way
-    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
-    # The trace of R_commanded^T R is 1 + 2 cos(angle between them).
-    turned = np.einsum("nij,nij->n", tips[:, :3, :3], commanded[:, :3, :3])
-    angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
-    ahead = np.linalg.norm(np.cross(tips[:, :3, 2], commanded[:, :3, 2]), axis=1)
-    tilt = float(np.degrees(np.arcsin(min(ahead.max(), 1.0))))
-    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()), tilt)
-
-
 _AT_LIMIT_RAD = np.radians(0.5)
+
 _Refused = Literal["unreachable_start", "unreachable"]
 
 
@@ -119,25 +37,25 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     without an arm were tuned with that one.
 
     Args:
-        searches: As in `moves`.
+        spiral: As in `moves`.
     """
     predicted = list[ArmMove]()
-    believed = plan.start
+    estimated = plan.start
     for move in moves(plan, scene, spiral):
         operation = plan.assembly.operations[move.step.operation]
-        after = after_transfer(operation, move.transfer.T_world_goal, believed)
+        after = after_transfer(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]
-        predicted.append(_arm_move(scene, move, held, believed, after))
-        believed = after
+        predicted.append(_arm_move(scene, move, held, estimated, after))
+        estimated = after
     return tuple(predicted)
 
 
-def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], believed: Poses, after: Poses) -> ArmMove:
+def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], estimated: Poses, after: Poses) -> ArmMove:
     """One transfer.
 
     Args:
         held: What moves, each with its pose at the end.
-        believed: Where all parts are before it.
+        estimated: The poses of all parts before it.
         after: Where all parts are after it.
     """
     step = move.step
@@ -148,7 +66,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
     T_tip = scene.kinematics.forward(path[-1])
-    depth, struck = struck_by(scene, t, believed, after)
+    depth, struck = struck_by(scene, t, estimated, after)
     low, high = scene.kinematics.range_of_joints
     return ArmMove(
         operation=step.operation,
@@ -169,15 +87,15 @@ def _at_limit(scene: Scene, q: Array) -> str:
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
 
 
-def struck_by(scene: Scene, t: Transfer, believed: Poses, after: Poses) -> tuple[float, str]:
+def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tuple[float, str]:
     """How deep the open gripper is in a part, [m], and in which, where it takes hold or lets go."""
     return max(
-        _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
-        _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
+        _deepest_strike(scene, t.part, t.grips[0], OPEN_TO_PICK_M, estimated),
+        _deepest_strike(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
     )
 
 
-def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
+def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
     go; zero and nothing where they have room."""
     boxes = gripper_boxes(scene.kinematics, scene.arm, min(grip.half_width + beyond, scene.arm.opening_m))

@@ -1,4 +1,4 @@
-"""From the description of an arm to an `Arm`: its model put together, its joints driven, its gripper measured."""
+"""Build an `Arm` from its description: put its model together, drive its joints, measure its gripper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,17 +7,22 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import structs
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
+from apo_bench.io import named_files
+from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.kinematics import with_home
-from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model, stated_arm
-from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
+from apo_bench.simulation.arms.grooves import fill_grooves
+from apo_bench.simulation.arms.home import with_home
+from apo_bench.simulation.arms.loading import compile_model, load_model
+from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.stated import speed_limits, stated_arm
 from apo_bench.simulation.arms.strength import with_force
 from apo_bench.simulation.physics import without_log_file
 
@@ -29,9 +34,9 @@ _FINGER_DAMPING = 0.02
 _COUPLED_SOLREF = (0.004, 1.0)
 _COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)
 _UNSAID_SOLREF = (0.02, 1.0)
-"""Fingers that are coupled as softly as MuJoCo has it where nothing is said give way by 1 mm to some newtons; they get
+"""Fingers that are coupled as softly as MuJoCo has it by default give way by 1 mm to some newtons; they get
 the first two, which the grippers that come with the benchmark have."""
-_USUAL_FINGERS_M_S = 0.05
+_USUAL_FINGERS_MM_S = 50.0
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
 _MOST_BUILT = 8
@@ -63,44 +68,42 @@ def build_arm(description: ArmDescription) -> Arm:
     """Put an arm together.
 
     Raises:
-        InputError: Its models do not fit the description, or cannot be used; what to do is said.
+        InputError: Its models do not fit the description, or cannot be used.
     """
-    mjcf = description.mjcf
+    mjcf = description.model_file
     spec = load_model(mjcf, "arm")
-    model = compiled(spec, mjcf)
-    check_surroundings(model, mjcf)
+    model = compile_model(spec, mjcf)
     flange, T_flange = find_flange(model, description)
     joints = find_joints(model, flange, description)
     last = model.body(flange).name
     if description.gripper.slides is not None:
-        return stated_arm(description, description.gripper.slides, model, joints, last)
+        return stated_arm(description, model, joints, last)
     _mount_gripper(spec, last, T_flange, description)
     _make_passive(spec, joints)
     if description.gripper.pads is None:
         fill_grooves(spec, joints)
-    whole = compiled(spec, mjcf)
+    whole = compile_model(spec, mjcf)
     drives = drives_of(whole, joints)
-    home = _usual_home(model, joints) if description.home is None else description.home
-    rig = _measuring_model(spec, mjcf)
+    home = _usual_home(model, joints) if description.home_deg is None else np.radians(description.home_deg)
     require(
         len(home) == len(joints),
         f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.",
     )
-    gripper = _with_names_as_mounted(rig, description.gripper)
-    where = gripper.mjcf or mjcf
-    flange = rig.body(last).id
+    gripper = _with_names_as_mounted(whole, description.gripper)
+    where = description.gripper_file or mjcf
     with without_log_file():
         measured, times = with_force(
             spec,
             gripper.force_n,
             description.file,
-            lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, flange, gripper),
+            lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, last, gripper),
         )
     hand = measured.hand
+    base = pose.pack(description.base_frame)
     arm = Arm(
         mjcf=description.file,
-        base=tuple(description.base[:3, 3].tolist()),
-        turn=tuple(_quaternion(description.base).tolist()),
+        base=tuple(base[:3].tolist()),
+        turn=tuple(base[3:].tolist()),
         joints=tuple(joints),
         tip=_TIP,
         fingers=hand.joints,
@@ -113,14 +116,14 @@ def build_arm(description: ArmDescription) -> Arm:
         hand=hand,
         limits=ArmLimits(
             payload_kg=description.payload_kg,
-            speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),
+            speed_rad_s=speed_limits(description, len(joints)),
             torque_nm=np.array([drives[name].torque for name in joints]),
-            fingers_m_s=description.gripper.speed_m_s or _USUAL_FINGERS_M_S,
+            fingers_m_s=1e-3 * (gripper.speed_mm_s or _USUAL_FINGERS_MM_S),
         ),
         files=_files(description),
     )
-    if description.home is None:
-        arm = with_home(arm, description.base_is_stated)
+    if description.home_deg is None:
+        arm = with_home(arm, description.base is not None)
     own = _drive(spec, joints, felt_inertia(whole, joints, arm.home), drives, hand.actuators, description)
     spec.compile()
     control = "own position actuators" if own else "position servos made from the model"
@@ -129,14 +132,13 @@ def build_arm(description: ArmDescription) -> Arm:
 
 
 def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
-    """Attach the gripper of a file of its own to the flange, a body."""
-    gripper = description.gripper
-    if gripper.mjcf is not None:
-        hand = load_model(gripper.mjcf, "gripper")
+    """Attach the gripper of another file to the flange, a body."""
+    if description.gripper_file is not None:
+        hand = load_model(description.gripper_file, "gripper")
         hand.option = spec.option
-        T = T_flange @ gripper.mount
+        T = T_flange @ description.gripper.mount.matrix
         spec.attach(hand, frame=spec.body(flange).add_frame(pos=T[:3, 3], quat=_quaternion(T)), prefix=_GRIPPER)
-    elif not np.array_equal(gripper.mount, np.eye(4)):
+    elif not np.array_equal(description.gripper.mount.matrix, np.eye(4)):
         raise InputError(
             f"{description.file}, gripper: 'mount' needs 'mjcf'; a gripper that is part of the arm has its place."
         )
@@ -150,10 +152,10 @@ def _with_names_as_mounted(model: Any, gripper: GripperDescription) -> GripperDe
     shapes = {model.body(i).name for i in range(model.nbody)} | {model.geom(i).name for i in range(model.ngeom)}
     if gripper.actuators is not None:
         names = tuple(name if name in actuators else _GRIPPER + name for name in gripper.actuators)
-        gripper = replace(gripper, actuators=names)
+        gripper = structs.replace(gripper, actuators=names)
     if gripper.pads is not None:
         a, b = (name if name in shapes else _GRIPPER + name for name in gripper.pads)
-        gripper = replace(gripper, pads=(a, b))
+        gripper = structs.replace(gripper, pads=(a, b))
     return gripper
 
 
@@ -194,7 +196,7 @@ def _measuring_model(spec: Any, mjcf: Path) -> Any:
     rig = spec.copy()
     probe = rig.worldbody.add_body(name=PROBE, mocap=True, pos=(0.0, 0.0, -1.0))
     probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.01, 0.01), contype=0, conaffinity=1)
-    return compiled(rig, mjcf)
+    return compile_model(rig, mjcf)
 
 
 def _drive(
@@ -208,11 +210,11 @@ def _drive(
     """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos.
 
     Args:
-        inertia: (joints,), that each joint feels, [kg m^2].
+        inertia: (joints,), at each joint, [kg m^2].
         drives: Of each joint; takes the torques of the description.
         kept: Actuators of the gripper, which stay.
     """
-    torques = description.of_each_joint("torque_nm", description.torque_nm, len(joints))
+    torques = description.of_each_joint("torque_nm", len(joints))
     if torques is not None:
         drives.update({name: drives[name]._replace(torque=float(x)) for name, x in zip(joints, torques, strict=True)})
     names = [actuator.name for actuator in spec.actuators]
@@ -240,9 +242,8 @@ def _text(spec: Any, measured: Measured) -> str:
 
 
 def _files(description: ArmDescription) -> tuple[Path, ...]:
-    gripper = files_of(description.gripper.mjcf) if description.gripper.mjcf is not None else ()
-    own = () if description.file == description.mjcf else (description.file,)
-    return tuple(dict.fromkeys((*own, *files_of(description.mjcf), *gripper)))
+    gripper = () if description.gripper_file is None else named_files(description.gripper_file)
+    return tuple(dict.fromkeys((description.file, *named_files(description.model_file), *gripper)))
 
 
 def _usual_home(model: Any, joints: Sequence[str]) -> Array:

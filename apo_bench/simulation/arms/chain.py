@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.arm import ArmDescription
-from apo_bench.simulation.arms.rig import geom_reach
+from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.shapes import geom_reach
 from apo_bench.simulation.frames import frame, rotation
 
 _USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment", "pinch_site")
@@ -21,7 +21,7 @@ _MOST_JOINTS = 8
 def find_flange(model: Any, description: ArmDescription) -> tuple[int, Array]:
     """The body at the end of the arm, and the frame of the flange in it.
 
-    A gripper of its own file is mounted where the last link ends along the axis of its joint, if nothing tells where.
+    A gripper of its own file is mounted where the last link ends along the axis of its joint, unless a flange is known.
     """
     sites = {model.site(i).name: i for i in range(model.nsite)}
     bodies = {model.body(i).name: i for i in range(1, model.nbody)}
@@ -51,7 +51,7 @@ def _last_link(model: Any, description: ArmDescription) -> int:
         body = moving[0]
     while body and (not model.body_jntnum[body] or (not moving and _is_jaw(model, body))):
         body = int(model.body_parentid[body])
-    require(body, f"{description.mjcf}: the arm has no joints; give the MJCF file of an arm.")
+    require(body, f"{description.model_file}: the arm has no joints; give the MJCF file of an arm.")
     return body
 
 
@@ -95,18 +95,18 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
     for j, name in zip(chain, names, strict=True):
         require(
             int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_HINGE),
-            f"{description.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.",
+            f"{description.model_file}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.",
         )
     if description.joints is not None:
         require(
             sorted(description.joints) == sorted(names),
             f"{description.file}: 'joints' are {', '.join(description.joints)}; between base and flange lie "
-            f"{', '.join(names) or 'uncorrected'}.",
+            f"{', '.join(names) or 'none'}.",
         )
         names = [name for name in names if name in description.joints]
     require(
         _LEAST_JOINTS <= len(names) <= _MOST_JOINTS,
-        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'uncorrected'}); "
+        f"{description.model_file}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
         f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'.",
     )
     return names

@@ -15,8 +15,9 @@ from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 from apo_bench.names import resolve
 from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
-from apo_bench.simulation.arms.arm import Arm, ArmDescription, GripperDescription
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_arm, read_described
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.loading import load_model
 
 _MENAGERIE = "APO_BENCH_MENAGERIE"
@@ -96,7 +97,7 @@ def _of_menagerie(name: str) -> ArmDescription:
         gripper is None or gripper.is_file(),
         f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.",
     )
-    return ArmDescription(file=files[0], mjcf=files[0], gripper=GripperDescription(mjcf=gripper))
+    return _foreign_arm(files[0], gripper)
 
 
 def _of_robosuite(name: str) -> ArmDescription:
@@ -112,7 +113,13 @@ def _of_robosuite(name: str) -> ArmDescription:
         raise InputError(f"{root}: {unknown('arm', name, _GRIPPERS)}")
     mjcf = robots / key / "robot.xml"
     gripper = root / "models" / "assets" / "grippers" / f"{_GRIPPERS[key]}.xml"
-    return ArmDescription(file=mjcf, mjcf=mjcf, flange="right_hand", gripper=GripperDescription(mjcf=gripper))
+    return _foreign_arm(mjcf, gripper, "right_hand")
+
+
+def _foreign_arm(mjcf: Path, gripper: Path | None, flange: str | None = None) -> ArmDescription:
+    """The description of an arm without an arm file."""
+    hand = GripperDescription(mjcf=None if gripper is None else str(gripper.absolute()))
+    return ArmDescription(schema="apo-bench/arm/1", file=mjcf, mjcf=mjcf.name, flange=flange, gripper=hand)
 
 
 def _menageries() -> Iterator[Path]:

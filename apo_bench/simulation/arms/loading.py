@@ -1,9 +1,5 @@
-"""Read the model file of an arm or gripper, MJCF or URDF, as `MjSpec`, without what a scene has itself.
+"""Read the model file of an arm or gripper, MJCF or URDF, as `MjSpec`, without what a scene has itself."""
 
-`stated_arm` makes the arm of a description that states its gripper: the model is used as it is.
-"""
-
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,17 +7,12 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError, one_line, require, require_known
-from apo_bench.geometry import pose
-from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, SlideGripper
+from apo_bench.errors import InputError, one_line, require
 
 _LONGEST = 200
-_LARGEST_BASE_M = 0.5
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
 _OF_THE_SCENE = ("sensors", "keys", "cameras", "lights", "textures", "pairs", "skins", "texts", "numerics", "tuples")
 """A scene has these itself, or needs none of them."""
-_NOT_RIGID = ("flexes", "hfields", "plugins")
-"""An arm is made of rigid bodies, and runs no code."""
 
 
 def load_model(path: Path, kind: str) -> Any:
@@ -35,15 +26,13 @@ def load_model(path: Path, kind: str) -> Any:
         kind: What the file should be, for the message: `arm`, `gripper`.
 
     Raises:
-        InputError: There is no such file, MuJoCo cannot read it, it has what no arm has, or a mesh is missing.
+        InputError: There is no such file, MuJoCo cannot read it, or a mesh is missing.
     """
     require(path.is_file(), f"{path}: the model file of the {kind} is missing; check the path.")
     try:
         spec = _read(path)
     except (ValueError, RuntimeError, mujoco.FatalError, ElementTree.ParseError) as error:
         raise InputError(f"{path}: MuJoCo cannot read this model file of the {kind}: {_reason(error)}.") from error
-    _check_kinds(spec, path, kind)
-    _check_world(spec, path, kind)
     for plural in _OF_THE_SCENE:
         for each in list(getattr(spec, plural)):
             spec.delete(each)
@@ -64,7 +53,7 @@ def load_model(path: Path, kind: str) -> Any:
     return spec
 
 
-def compiled(spec: Any, path: Path) -> Any:
+def compile_model(spec: Any, path: Path) -> Any:
     """The model of what was read.
 
     Raises:
@@ -80,16 +69,6 @@ def compiled(spec: Any, path: Path) -> Any:
         f"{path}: a position, a direction or a range is not a finite number; correct the file.",
     )
     return model
-
-
-def files_of(path: Path) -> tuple[Path, ...]:
-    """A model file, with the files that it includes and the meshes that it names."""
-    try:
-        included = tuple(_included(path, path.parent, frozenset()))
-        meshes = tuple(_mesh_file(spec, mesh) for spec in (_read(path),) for mesh in spec.meshes)
-    except (OSError, ValueError, RuntimeError, mujoco.FatalError, ElementTree.ParseError):
-        return (path,)
-    return tuple(dict.fromkeys((*included, *meshes)))
 
 
 def _read(path: Path) -> Any:
@@ -117,73 +96,9 @@ def _read(path: Path) -> Any:
     return spec
 
 
-def _included(path: Path, main: Path, outer: frozenset[Path]) -> Iterator[Path]:
-    """A file and what it includes; MuJoCo looks for these in the folder of the main file."""
-    yield path
-    for include in ElementTree.parse(path).iter("include"):
-        file = main / include.get("file", "")
-        if file not in outer and file.is_file():
-            yield from _included(file, main, outer | {file})
-
-
 def _mesh_file(spec: Any, mesh: Any) -> Path:
     stated = Path(mesh.file)
     return (Path(spec.modelfiledir) / spec.meshdir / stated).absolute()
-
-
-def _check_kinds(spec: Any, path: Path, kind: str) -> None:
-    """Rigid bodies that nothing outside of the model moves."""
-    for plural in _NOT_RIGID:
-        require(
-            not len(getattr(spec, plural)),
-            f"{path}: the {kind} has {plural}; an arm has rigid bodies and actuators only, so remove them.",
-        )
-    for body in spec.bodies:
-        require(not body.mocap, f"{path}: the body '{body.name}' of the {kind} is a mocap body; remove mocap=.")
-
-
-def _check_world(spec: Any, path: Path, kind: str) -> None:
-    """One thing, of hinges and slides, that nothing ties to the world."""
-    for joint in spec.joints:
-        require(
-            joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
-            f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
-            "grippers hinges and slides.",
-        )
-    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
-    require(
-        len(moving) <= 1,
-        f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one.",
-    )
-    for equality in spec.equalities:
-        holds = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
-        bodies = {equality.name1, equality.name2} if equality.objtype == mujoco.mjtObj.mjOBJ_BODY else set()
-        require(
-            not holds or not bodies & {"", "world"},
-            f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves.",
-        )
-
-
-def check_surroundings(model: Any, path: Path) -> None:
-    """Raise an `InputError` if what stands fast in the file of an arm reaches farther than a base does."""
-    first = int(model.jnt_bodyid[0]) if model.njnt else 0
-    at = model.body_pos[model.body_rootid[first]][:2]
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    for geom in range(model.ngeom):
-        touches = model.geom_contype[geom] or model.geom_conaffinity[geom]
-        if not touches or model.body_weldid[model.geom_bodyid[geom]]:
-            continue
-        is_plane = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_PLANE)
-        R = data.geom_xmat[geom].reshape(3, 3)
-        middle = data.geom_xpos[geom] + R @ model.geom_aabb[geom, :3]
-        half = np.abs(R) @ model.geom_aabb[geom, 3:]
-        reach = float(np.linalg.norm(np.abs(middle[:2] - at) + half[:2]))
-        if is_plane or reach > _LARGEST_BASE_M:
-            raise InputError(
-                f"{path}: the geom '{model.geom(geom).name}' stands fast and reaches farther than "
-                f"{_LARGEST_BASE_M:g} m from the arm; remove it, what is around the arm belongs to the scenario."
-            )
 
 
 def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
@@ -205,51 +120,3 @@ def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
 def _reason(error: Exception) -> str:
     """What MuJoCo says, in one line."""
     return one_line(" ".join(str(error).split()).rstrip("."), _LONGEST)
-
-
-def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, joints: list[str], flange: str) -> Arm:
-    """The arm of a file whose gripper is stated.
-
-    Args:
-        model: As its MJCF file says it, compiled.
-        joints: The hinges between base and flange.
-        flange: The body at the end of the arm.
-
-    Raises:
-        InputError: Its model has not what the file names, or something is not stated that nothing else tells.
-    """
-    file = description.file
-    if description.home is None or len(description.home) != len(joints):
-        raise InputError(f"{file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
-    require(
-        description.torque_nm is None, f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out."
-    )
-    (grip, *more) = description.gripper.actuators or ("",)
-    require(not more, f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
-    require_known("site", slides.tip, [model.site(i).name for i in range(model.nsite)], place=file)
-    sliding = [
-        model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
-    ]
-    for name in slides.joints:
-        require_known("slide", name, sliding, place=file)
-    actuators = [model.actuator(i).name for i in range(model.nu)]
-    for name in (*joints, grip):
-        require_known("actuator", name, actuators, place=file)
-    return Arm(
-        mjcf=description.mjcf,
-        base=tuple(description.base[:3, 3].tolist()),
-        turn=tuple(pose.pack(description.base)[3:].tolist()),
-        joints=tuple(joints),
-        tip=slides.tip,
-        fingers=slides.joints,
-        grip=grip,
-        mount=flange,
-        home=description.home,
-        opening_m=slides.opening_m,
-        limits=ArmLimits(
-            payload_kg=description.payload_kg,
-            speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),
-            fingers_m_s=description.gripper.speed_m_s or ArmLimits.fingers_m_s,
-        ),
-        files=tuple(dict.fromkeys((file, *files_of(description.mjcf)))),
-    )

@@ -1,17 +1,11 @@
-"""What a gripper does, found by driving it: which surfaces hold, how far they open, how hard they push.
+"""Measure a gripper by driving it: which surfaces hold, how far they open, how hard they push.
 
-Nothing but the drive is simulated: no gravity, the arm stands still. Fingers are what moves; they close along the
-direction in which two groups of them move towards each other. Of each group, what reaches farthest are the pads.
-
-Grooves between the boxes of a fingertip, filled.
-
-A round part that comes to lie in a groove between two boxes is pushed on by MuJoCo along the sides of the groove, where
-it overlaps them least, and not away from the pad: it is wedged, and opening fingers take it along (the hand of the
-Panda in Menagerie, four boxes of 6 mm with 4 and 5 mm between them: 7 N).
+Only the drive is simulated: no gravity, the arm stands still. Fingers are what moves; they close along the direction in
+which two groups of them move towards each other. The pads of a group are what reaches farthest.
 """
 
 from collections.abc import Sequence
-from itertools import permutations, product
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,9 +14,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.simulation.arms.arm import GripperDescription, Hand
-from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import LONGEST_S, Rig, below, command_ends, geom_reach, pads_of, rig_of
+from apo_bench.simulation.arms.arm import Hand
+from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.pads import pads_of
+from apo_bench.simulation.arms.pressing import force_of
+from apo_bench.simulation.arms.rig import LONGEST_S, Rig, command_ends, rig_of
+from apo_bench.simulation.arms.shapes import below, geom_reach
 from apo_bench.simulation.frames import frame
 
 _LEVELS = 17
@@ -46,18 +43,19 @@ class Measured(NamedTuple):
 
 
 def measure(
-    model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, gripper: GripperDescription
+    model: Any, path: Path, joints: Sequence[str], home: Array, last: str, gripper: GripperDescription
 ) -> Measured:
     """Drive the gripper of a compiled arm.
 
     Args:
         path: The file, for messages.
         joints: Of the arm; they stand still at `home`, [rad].
-        flange: The body behind the gripper.
+        last: The body behind the gripper.
 
     Raises:
         InputError: There is nothing that moves, or nothing that closes; what to state is gripper.
     """
+    flange = model.body(last).id
     rig = rig_of(model, path, joints, home, flange, gripper)
     widths = {}
     longest = 0.0
@@ -67,12 +65,8 @@ def measure(
         widths[command] = float(np.linalg.norm(bodies - bodies.mean(axis=0), axis=1).sum())
     if longest >= LONGEST_S:
         rig.steady()
-    if gripper.open is not None and gripper.closed is not None:
-        opened = gripper.open
-        closed = gripper.closed
-    else:
-        opened = np.array(max(widths, key=widths.__getitem__))
-        closed = np.array(min(widths, key=widths.__getitem__))
+    opened = np.array(gripper.open or max(widths, key=widths.__getitem__))
+    closed = np.array(gripper.closed or min(widths, key=widths.__getitem__))
     rig.settle(closed)
     at_closed = np.array(rig.data.geom_xpos)
     seconds = rig.settle(opened)
@@ -90,7 +84,6 @@ class _Level(NamedTuple):
     """How far the pads reach ahead, world, [m]."""
     middle: Array
     """Between the pads, (3,), world, [m]."""
-    R_pad: Array
 
 
 def _table(
@@ -113,8 +106,7 @@ def _table(
         width, middle = _between(model, data, sides)
         joints = np.array(data.qpos[model.jnt_qposadr[rig.joints]])
         reach = max(geom_reach(model, data, g, ahead) for g in pads)
-        R_pad = np.array(data.geom_xmat[pads[0]].reshape(3, 3))
-        levels.append(_Level(width / 2, command, joints, reach, middle, R_pad))
+        levels.append(_Level(width / 2, command, joints, reach, middle))
     table = [levels[i] for i in _ascending([level.opening for level in levels])]
     widest = table[-1].opening
     if widest - max(table[0].opening, 0.0) < _LEAST_M / 2:
@@ -140,8 +132,6 @@ def _table(
     openings = np.array([level.opening for level in table])
     commands = np.array([level.command for level in table])
     press, squeeze = force_of(rig, at, R, openings, commands)
-    apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across)) - thick
-    half_open = min(table, key=lambda level: abs(level.opening - widest / 2))
     hand = Hand(
         actuators=tuple(model.actuator(int(a)).name for a in rig.actuators),
         joints=tuple(model.joint(int(j)).name for j in rig.joints),
@@ -150,21 +140,12 @@ def _table(
         states=np.array([level.joints for level in table]),
         force_n=press.force_n,
         squeeze_m=squeeze,
-        gives_m=max(0.0, PROBE_WIDE * widest - apart / 2),
-        turns_deg=_angle(half_open.R_pad, table[-1].R_pad),
         friction=press.friction,
         pads=(model.geom(left).name, model.geom(right).name),
         thick_m=thick,
         seconds=seconds + _STROKE_S,
-        reach=np.array([level.reach - longest + _BEYOND_M for level in table]),
-        evenness=press.evenness,
     )
     return Measured(hand, model.body(mount).name, T)
-
-
-def _angle(R: Array, other: Array) -> float:
-    """Between two rotations, [deg]: the trace of R^T other is 1 + 2 cos."""
-    return float(np.degrees(np.arccos(np.clip((np.sum(R * other) - 1.0) / 2.0, -1.0, 1.0))))
 
 
 def _ascending(openings: Sequence[float]) -> list[int]:
@@ -201,41 +182,3 @@ def _mount(model: Any, pads: Sequence[int], flange: int) -> int:
             break
         mount = parent
     return mount
-
-
-_GROOVE_M = 0.008
-_SAME_M = 1e-5
-"""Wider than the first is no groove; boxes whose ends differ by less than the second end alike."""
-
-
-def fill_grooves(spec: Any, joints: Sequence[str]) -> None:
-    """Make one box of two of the same finger that are alike but for their places along one axis.
-
-    Args:
-        joints: Of the arm; bodies that turn by them are no fingers.
-    """
-    for body in spec.bodies[1:]:
-        moved = [joint.name for joint in body.joints]
-        if moved and not set(moved) & set(joints):
-            while _fill_one(spec, body):
-                pass
-
-
-def _fill_one(spec: Any, body: Any) -> bool:
-    boxes = [geom for geom in body.geoms if geom.type == mujoco.mjtGeom.mjGEOM_BOX and geom.contype]
-    for one, other in permutations(boxes, 2):
-        # Ends along the axes of the boxes, which are those of the finger.
-        if not (_upright(one) and _upright(other)):
-            continue
-        low, high = one.pos - one.size, one.pos + one.size
-        far, end = other.pos - other.size, other.pos + other.size
-        differ = np.flatnonzero((np.abs(low - far) > _SAME_M) | (np.abs(high - end) > _SAME_M))
-        if len(differ) == 1 and _SAME_M < (far - high)[differ[0]] < _GROOVE_M:
-            one.pos, one.size = (low + end) / 2, (end - low) / 2
-            spec.delete(other)
-            return True
-    return False
-
-
-def _upright(geom: Any) -> bool:
-    return bool(abs(geom.quat[0]) > 1.0 - _SAME_M)

@@ -31,8 +31,6 @@ class Press(NamedTuple):
     force_n: float
     """Of each, the mean of both."""
     friction: float
-    evenness: float
-    """The push of the weaker pad, as a part of that of the stronger one."""
 
 
 def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) -> tuple[Press, float]:
@@ -51,27 +49,26 @@ def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) ->
     model.geom_aabb[geom, 3:] = half
     mocap = int(model.body_mocapid[body])
     data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
-    press, squeeze = Press(0.0, 0.0, 1.0), 0.0
+    press, squeeze = Press(0.0, 0.0), 0.0
     for squeeze in _SQUEEZES_M:
         rig.settle(opened)
         data.mocap_pos[mocap] = at
         data.mocap_quat[mocap] = quaternion(R)
         closed = np.array([np.interp(half[0] - squeeze, openings, column) for column in commands.T])
-        press = _pressed(rig, geom, opened, closed, R[:, 0])
+        press = _press(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
         if press.force_n <= _MOST_N:
             break
     return press, squeeze
 
 
-def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> Press:
+def _press(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> Press:
     data = rig.data
     for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)
     rig.settle(closed)
     total = 0.0
     rubs = 0.0
-    sides = [0.0, 0.0]
     wrench = np.zeros(6)
     for _ in range(_LOOKS):
         rig.settle(closed, STEP_S)
@@ -80,8 +77,5 @@ def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) 
             push = abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
             pad = next(int(g) for g in data.contact[c].geom if g != probe)
             total += push
-            sides[int((data.contact[c].pos - data.geom_xpos[probe]) @ across > 0.0)] += push
             rubs += push * float(rig.model.geom_friction[pad, 0])
-    if not total:
-        return Press(0.0, 0.0, 1.0)
-    return Press(total / 2 / _LOOKS, round(rubs / total, 6), round(min(sides) / max(sides), 6))
+    return Press(total / 2 / _LOOKS, round(rubs / total, 6) if total else 0.0)

@@ -1,7 +1,4 @@
-"""A compiled arm in which only the gripper moves: no gravity, the arm stands still; and which of its surfaces hold.
-
-Pads are, of the two groups of shapes that move towards each other, what reaches farthest.
-"""
+"""A compiled arm in which only the gripper moves: no gravity, and the arm stands still."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -13,7 +10,8 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Ints
-from apo_bench.simulation.arms.arm import GripperDescription
+from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.shapes import below
 from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
@@ -24,12 +22,6 @@ _QUIET = 20
 _HEAVY = 10.0
 """[kg m^2]"""
 _MOST_ACTUATORS = 4
-_MOVES_M = 0.001
-_TIP_M = 0.012
-"""What moves less than the first is no finger; what ends within the second of the farthest end is of a pad."""
-_SNAP = float(np.cos(np.radians(1.0)))
-_SNAP_AHEAD = float(np.cos(np.radians(10.0)))
-"""A direction so near to an axis of the flange is meant as that axis."""
 
 
 class Rig(NamedTuple):
@@ -62,7 +54,7 @@ class Rig(NamedTuple):
             quiet = quiet + 1 if np.abs(data.qvel[dof]).max() < _STILL else 0
         require(
             np.isfinite(data.qpos).all() and not data.warning.number.any(),
-            f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.",
+            f"{self.path}: the gripper is unstable when it is driven; correct its actuators or masses.",
         )
         mujoco.mj_kinematics(model, data)
         return STEP_S * steps
@@ -77,7 +69,7 @@ def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: i
     """The model made ready: hard contacts and no gravity.
 
     Raises:
-        InputError: Nothing of the gripper moves, or what moves it is not known; what to state is said.
+        InputError: Nothing of the gripper moves, or what moves it is not known.
     """
     arm = [model.joint(name).id for name in joints]
     hanging = below(model, flange)
@@ -115,9 +107,7 @@ def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], gripper: G
     if gripper.actuators is not None:
         known = [model.actuator(i).name for i in range(model.nu)]
         if missing := [name for name in gripper.actuators if name not in known]:
-            raise InputError(
-                f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'uncorrected'}."
-            )
+            raise InputError(f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'none'}.")
         return np.array([model.actuator(name).id for name in gripper.actuators])
     moment = np.zeros((model.nu, model.nv))
     if model.nu:
@@ -152,74 +142,3 @@ def command_ends(rig: Rig, gripper: GripperDescription) -> list[tuple[float, ...
                 "'gripper'."
             )
     return list(product(*model.actuator_ctrlrange[rig.actuators].tolist()))
-
-
-def below(model: Any, body: int) -> set[int]:
-    """A body and what hangs on it."""
-    hanging = {body}
-    for b in range(body + 1, model.nbody):
-        if int(model.body_parentid[b]) in hanging:
-            hanging.add(b)
-    return hanging
-
-
-def pads_of(
-    rig: Rig, gripper: GripperDescription, way: Array, flange: int
-) -> tuple[tuple[list[int], list[int]], Array, Array]:
-    """The pads of both sides, by geom; the closing direction and the way ahead, unit vectors, world."""
-    model = rig.model
-    data = rig.data
-    hanging = below(model, flange)
-    touching = [
-        g
-        for g in range(model.ngeom)
-        if int(model.geom_bodyid[g]) in hanging and (model.geom_contype[g] or model.geom_conaffinity[g])
-    ]
-    moving = [g for g in touching if np.linalg.norm(way[g]) > _MOVES_M]
-    if gripper.pads is not None:
-        called = {g: (model.geom(g).name, model.body(int(model.geom_bodyid[g])).name) for g in touching}
-        named = [[g for g in touching if name in called[g]] for name in gripper.pads]
-        for name, geoms in zip(gripper.pads, named, strict=True):
-            require(geoms, f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
-        moving = named[0] + named[1]
-    require(
-        len(moving) >= 2,
-        f"{rig.path}: nothing of the gripper moves between its ends of command; state 'open' and 'closed'.",
-    )
-    # The direction in which the motions of all shapes are largest in the mean square: the first right singular vector.
-    across = np.linalg.svd(way[moving], full_matrices=False)[2][0]
-    first = [g for g in moving if way[g] @ across > 0.3 * np.linalg.norm(way[g])]
-    second = [g for g in moving if way[g] @ across < -0.3 * np.linalg.norm(way[g])]
-    if gripper.pads is not None:
-        first, second = named
-    require(first and second, f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
-    R_flange = data.xmat[flange].reshape(3, 3)
-    across = _snapped(across, R_flange, _SNAP)
-    middle = np.mean([data.geom_xpos[g] for g in first + second], axis=0) - data.xpos[flange]
-    ahead = middle - (middle @ across) * across
-    require(
-        np.linalg.norm(ahead) >= 1e-3,
-        f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.",
-    )
-    ahead = _snapped(ahead / np.linalg.norm(ahead), R_flange, _SNAP_AHEAD)
-    if gripper.pads is None:
-        most = max(geom_reach(model, data, g, ahead) for g in first + second)
-        first = [g for g in first if geom_reach(model, data, g, ahead) > most - _TIP_M]
-        second = [g for g in second if geom_reach(model, data, g, ahead) > most - _TIP_M]
-    require(first and second, f"{rig.path}: one finger is longer than the other; name both 'pads' in 'gripper'.")
-    return (first, second), across, ahead
-
-
-def geom_reach(model: Any, data: Any, geom: int, ahead: Array) -> float:
-    """How far the box around a geom reaches along a direction, world, [m]."""
-    along = data.geom_xmat[geom].reshape(3, 3).T @ ahead
-    centre = model.geom_aabb[geom, :3]
-    half = model.geom_aabb[geom, 3:]
-    return float(data.geom_xpos[geom] @ ahead + centre @ along + half @ np.abs(along))
-
-
-def _snapped(direction: Array, R: Array, near: float) -> Array:
-    """An axis of a frame where a direction is as good as that, else the direction."""
-    along = R.T @ direction
-    k = int(np.abs(along).argmax())
-    return np.asarray(np.sign(along[k]) * R[:, k] if abs(along[k]) > near else direction)

@@ -1,6 +1,6 @@
 """Joint position control for arms that have none, or whose own is too soft.
 
-Of every joint one position actuator: as stiff as the inertia that the joint feels at home lets it be at one natural
+Of every joint one position actuator: as stiff as the inertia at the joint at home allows at one natural
 frequency, damped critically, limited by the torque of the joint. Gravity is compensated; the velocity of the path is
 fed forward by the robot (`Robot._lead`).
 """
@@ -28,7 +28,7 @@ class Drive(NamedTuple):
     stiffness: float
     """[Nm/rad] of a position actuator, else 0."""
     torque: float
-    """The most it can do, [Nm]; infinite if nothing is said."""
+    """The most it can do, [Nm]; infinite if not stated."""
 
 
 def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
@@ -67,7 +67,7 @@ def felt_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
 
 
 def stiffness_for(inertia: float) -> float:
-    """The stiffness of a joint that feels an inertia, [Nm/rad]."""
+    """The stiffness for an inertia at the joint, [Nm/rad]."""
     usual, most = ((2.0 * math.pi * hz) ** 2 * inertia for hz in (_SOFT_HZ, _MOST_HZ))
     return min(max(usual, _STIFF_NM), most)
 

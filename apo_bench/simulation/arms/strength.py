@@ -1,4 +1,4 @@
-"""How hard a gripper pushes where its file says so, or where its model hardly pushes at all: its own drive, scaled."""
+"""Scale the drive of a gripper to the force that its file states, or where its model hardly pushes."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,8 +21,8 @@ def with_force(
 ) -> tuple[Measured, float]:
     """Measure the gripper of an arm, and scale its drive until each pad pushes as it should.
 
-    Gains, damping and limits of its actuators, and limits of the joints they push, are scaled alike in `spec`, so that
-    it closes as fast as before.
+    Gains, damping and limits of its actuators, and limits of the joints they push, are scaled by one factor in `spec`,
+    so that it closes as fast as before.
 
     Args:
         wanted_n: The force of each pad; None: as in the model, and 20 N where that is less than 10 N.
@@ -33,7 +33,7 @@ def with_force(
         What was measured at last, and how many times as strong as in the model the drive is then.
 
     Raises:
-        InputError: The force that was asked for is not reached, however strong the drive is.
+        InputError: The stated force is not reached, however strong the drive is.
     """
     first = measured(spec)
     if wanted_n is None and first.hand.force_n >= LEAST_FORCE_N:
@@ -53,7 +53,7 @@ def with_force(
         return first, 1.0
     raise InputError(
         f"{path}, gripper: 'force_n' is {wanted_n:g}, and each pad pushes with {scaled.hand.force_n:.1f} N after its "
-        f"drive was made {times:.3g} times as strong; state what it can do, or mend its actuators."
+        f"drive was made {times:.3g} times as strong; state what it can do, or correct its actuators."
     )
 
 

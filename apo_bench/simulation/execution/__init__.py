@@ -1,21 +1,29 @@
-"""A plan carried out by the robot."""
+"""The robot executes a plan."""
 
-from apo_bench.simulation.execution.beside import STAND_OFF_M
-from apo_bench.simulation.execution.carry_out import after_attach, before_attach, end_of_attach, pace, take
-from apo_bench.simulation.execution.controller import moves_of, replay, run_schedule, until_rest
+from apo_bench.simulation.execution.carry_out import after_attach, before_attach, end_of_attach, pace
+from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution.execution import Execution
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M, check_hold, depart, release
 from apo_bench.simulation.execution.grasping import RestingPart, Stroke, first_clear, obstacles, tip_frame
 from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, key_angles, moves
-from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state, take_up
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
+from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState, restore_state, save_state
+from apo_bench.simulation.execution.resting import wait_for_rest
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M
 from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer, arrival_line, hover
 
 __all__ = (
+    "DEFAULT_EXECUTION",
     "OPEN_TO_PICK_M",
     "OPEN_TO_RELEASE_M",
+    "PROBING_ACTIONS",
     "STAND_OFF_M",
+    "Execution",
+    "ExecutionConfig",
     "Grip",
     "Move",
-    "Progress",
+    "ProbingConfig",
     "ReplayCache",
     "RestingPart",
     "SavedState",
@@ -34,15 +42,12 @@ __all__ = (
     "in_reach",
     "key_angles",
     "moves",
-    "moves_of",
     "obstacles",
     "pace",
     "release",
     "replay",
-    "run_schedule",
-    "saved_state",
-    "take",
-    "take_up",
+    "restore_state",
+    "save_state",
     "tip_frame",
-    "until_rest",
+    "wait_for_rest",
 )

@@ -1,4 +1,4 @@
-"""How one operation is carried out: `take` (pick, lift), then `bring` (carry, attach, release, depart).
+"""Carry out one operation: `pick` (pick, lift), then `place` (carry, attach, release, depart).
 
 Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers. The macros of
 the plan are carried out in force: guarded where contacts close, by position along those that stay closed.
@@ -15,14 +15,25 @@ from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, grasp_again, release
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot import Guard, Halt, Robot, Trajectory, paced, shifted, smooth, steady, with_height
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Guard,
+    Robot,
+    Trajectory,
+    paced_trajectory,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+    with_height,
+)
+from apo_bench.simulation.robot.paths import distance
 
 _LIFT = (0.4, 0.25)
 _CARRY = (0.5, 0.35)
 _LOWER = (0.35, 0.2)
 """Peak speeds with a part, and with one that carries others, [m/s]: it drifts in the hand, the faster the more."""
 _LOST_LOAD = 0.8
-"""A hand that feels less than this part of the weight of a group has lost some of it."""
+"""A hand that weighs less than this part of the weight of a group has lost some of it."""
 _PLACE = 0.06
 _TOUCH = 0.01
 _INSERT = 0.06
@@ -34,14 +45,14 @@ _LEAVE = 0.03
 _OVERTRAVEL_M = 0.002
 """Contact is sought this far beyond the goal."""
 _BOTTOM_M = 0.003
-"""From this far before a bottom it is felt for."""
+"""The robot approaches a bottom slowly from this far before it."""
 _ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
 _THROUGH = 0.15
 """Steady speed [m/s] where only walls are that the part is between already."""
 _BEFORE_M = 0.008
 _BEHIND_M = 0.004
-"""A mouth may be so much nearer or farther than it is believed to be."""
+"""The entrance of a hole may be so much nearer or farther than estimated."""
 _BEYOND_M = 0.004
 _OFF_M = 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
@@ -49,14 +60,17 @@ _LOOSE_M = 0.00005
 """Faces this far apart touch for the judge, and do not rub."""
 
 
-def take(robot: Robot, t: Transfer, again: bool = False) -> int:
-    """Pick the part and lift it; returns which of its grips is then in use.
+def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
+    """Pick the part and lift it.
+
+    Returns:
+        Which of its grips is then in use.
 
     Args:
         again: Whether it is squared and grasped twice.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; stage and code name it.
     """
     for other in t.squaring:
         robot.stage = "pick"
@@ -68,22 +82,22 @@ def take(robot: Robot, t: Transfer, again: bool = False) -> int:
     in_use = _pull_out(robot, t) if t.out.level else 0
     robot.stage = "lift"
     if t.carried:
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, 0.004), 0.02))
     _leave(robot, t)
     robot.steady(not t.drawn)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
     robot.steady(False)
     return in_use
 
 
-def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
+def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
     """Carry the part that is held by its i-th grip, attach it, let go and depart.
 
     Args:
-        lay: Lays it flat first, before a level insertion below where that begins, and says how it is held then.
+        lay: Lays it flat first, before a level insertion below where that begins, and returns its grip then.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; stage and code name it.
     """
     grip, second = before_attach(robot, t, i, lay)
     robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
@@ -100,7 +114,7 @@ def before_attach(
         lay: As in `bring`.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; stage and code name it.
     """
     grip = t.grips[i]
     if lay is not None and not t.into.level:
@@ -113,13 +127,13 @@ def before_attach(
 
 
 def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_found: Array) -> None:
-    """What comes after a guarded motion to `end_of_attach` that somebody else has led: the rest of the operation.
+    """Do the rest of an operation after an agent has moved the part to `end_of_attach`.
 
     Args:
         T_found: What brings the poses that were meant to those that were found, (4, 4), world.
 
     Raises:
-        Halt: Something went wrong; the stage and code say what.
+        ExecutionAborted: Something went wrong; stage and code name it.
     """
     left = 0.0
     rise = t.floats
@@ -128,7 +142,7 @@ def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_f
         left = _to_goal(robot, t, grip, rise, T_found)
     lower = rise if t.into.level else 0.0
     guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.way, t.place_n)
-    robot.follow(steady(robot.T, shifted(robot.T, guard.way, lower + _OVERTRAVEL_M), _TOUCH), guard)
+    robot.follow(steady_trajectory(robot.T, translate(robot.T, guard.way, lower + _OVERTRAVEL_M), _TOUCH), guard)
     robot.stand()
     _slides(robot, t, left)
     _leave_there(robot, t, grip, left)
@@ -138,8 +152,8 @@ def end_of_attach(t: Transfer, grip: Grip, second: Grip | None) -> Array:
     """The tip pose at which the guarded motion ends, or the first of two with a change of the grip between, (4, 4)."""
     goal = first_contact_pose(t)
     if second is not None and t.into.left is not None:
-        goal = shifted(t.T_world_goal, t.into.way, -t.into.left)
-    return shifted(goal, UP, t.floats if t.into.level else 0.0) @ grip.T_part_tip
+        goal = translate(t.T_world_goal, t.into.way, -t.into.left)
+    return translate(goal, UP, t.floats if t.into.level else 0.0) @ grip.T_part_tip
 
 
 class Pace(NamedTuple):
@@ -150,18 +164,20 @@ class Pace(NamedTuple):
     stretches: tuple[tuple[float, float, float], ...]
     """From and to so far before the goal, [m], at most so fast, [m/s]."""
     end: float
-    """It ends so far before the goal, [m]; beyond it, where it is felt for."""
+    """It ends so far before the goal, [m]; beyond it where contact is sought."""
 
 
 def pace(t: Transfer, second: Grip | None) -> Pace:
-    """The pace of the motion to `end_of_attach`: slow where a mouth or contact may be."""
+    """The pace of the motion to `end_of_attach`: slow where an entrance or contact may be."""
     bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
     if not t.into.level:
         return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
-    mouths = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.mouths)
+    entrances = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.entrances)
     if second is not None and t.into.left is not None:
-        return Pace(_THROUGH, mouths, t.into.left)
-    return Pace(_THROUGH, (*mouths, (_BOTTOM_M, -math.inf, _TOUCH)) if bottom else mouths, -_OVERTRAVEL_M * bottom)
+        return Pace(_THROUGH, entrances, t.into.left)
+    if not bottom:
+        return Pace(_THROUGH, entrances, 0.0)
+    return Pace(_THROUGH, (*entrances, (_BOTTOM_M, -math.inf, _TOUCH)), -_OVERTRAVEL_M)
 
 
 def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
@@ -169,27 +185,27 @@ def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:
-        raise Halt("attach", "force_stop")
+        raise ExecutionAborted("attach", "force_stop")
     for other in t.centring:
         robot.stage = "release"
         centre(robot, t, other, t.T_world_goal)
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
-    """Over everything that stands, down to where the last motion begins; there the arm stands, and feels its load."""
+    """Over everything that stands, down to where the last motion begins; there the arm stands and weighs its load."""
     robot.stage = "carry"
-    before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
+    before = translate(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
     if t.into.level:
-        before = shifted(before, UP, t.floats)
+        before = translate(before, UP, t.floats)
     robot.steady(True)
     robot.go(with_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
-    robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
+    robot.follow(smooth_trajectory(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
-    robot.hold_watch = robot.hold_watch.carry(robot.in_hand())
+    robot.slip_monitor = robot.slip_monitor.carry(robot.in_hand())
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:
-        raise Halt("carry", "lost_grasp", " or ".join(t.carried))
+        raise ExecutionAborted("carry", "lost_grasp", " or ".join(t.carried))
 
 
 def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
@@ -223,31 +239,31 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
             return left + t.into.left, grip
         grip, rise = _with_other_grip(robot, t, grip, second, T_search)
     left = _to_goal(robot, t, grip, rise, T_search)
-    lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
-    robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
+    lower = translate(robot.T, UP, -rise - _OVERTRAVEL_M)
+    robot.follow(steady_trajectory(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.stand()
     return left, grip
 
 
 def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_search: Array | None) -> tuple[Grip, float]:
     """Take the part at its second place, and lift it off the floor; returns that grip, and how far up the part is."""
-    there = shifted(shifted(t.T_world_goal, t.into.way, -(t.into.left or 0.0)), UP, t.floats)
-    change_grip(robot, t, grip, second, after_search(T_search, shifted(there, UP, -t.floats) @ second.T_part_tip))
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.clearance), 0.01))
+    there = translate(translate(t.T_world_goal, t.into.way, -(t.into.left or 0.0)), UP, t.floats)
+    change_grip(robot, t, grip, second, after_search(T_search, translate(there, UP, -t.floats) @ second.T_part_tip))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.clearance), 0.01))
     return second, t.clearance
 
 
 def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array | None) -> float:
     """The guarded level line to the goal, and against a bottom; returns what is left of it, [m]."""
     guard = Guard(t.into.way, t.insert_n)
-    goal = after_search(T_search, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
+    goal = after_search(T_search, translate(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if not any(macro.name == "move-to-bottom" for macro in t.macros):
         return press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)[0]
-    line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
+    line = _into(robot, t, translate(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
     left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
     if left == 0.0:
-        beyond = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
-        robot.follow(steady(robot.T, beyond, _TOUCH), guard)
+        beyond = after_search(T_search, translate(goal, t.into.way, _OVERTRAVEL_M))
+        robot.follow(steady_trajectory(robot.T, beyond, _TOUCH), guard)
     return left
 
 
@@ -255,19 +271,18 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     """From above, slowly where contact may come any moment, until the part stands."""
     down = Guard(t.into.way, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
-    above = steady(robot.T, shifted(goal, t.into.way, -t.slow), _PLACE)
+    above = steady_trajectory(robot.T, translate(goal, t.into.way, -t.slow), _PLACE)
     left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
-        end = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
-        press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
+        end = after_search(T_search, translate(goal, t.into.way, _OVERTRAVEL_M))
+        press_in(robot, t, grip, steady_trajectory(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
     robot.stand()
 
 
 def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
-    """On to `left` [m] before the goal, slowly where a mouth may be."""
-    far = float(np.linalg.norm(end[:3, 3] - robot.T[:3, 3]))
-    at = [far + left - mouth for mouth in t.mouths]
-    return paced(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
+    """On to `left` [m] before the goal, slowly where an entrance may be."""
+    at = [distance(robot.T, end) + left - entrance for entrance in t.entrances]
+    return paced_trajectory(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 
 def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
@@ -278,33 +293,37 @@ def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -
             would pass for the next.
     """
     robot.macro = "slide-to-contact"
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
     if touched:
-        robot.follow(smooth(robot.T, shifted(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
     robot.stand()
-    robot.follow(steady(robot.T, shifted(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
-    robot.follow(steady(robot.T, shifted(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
+    robot.follow(
+        steady_trajectory(robot.T, translate(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n)
+    )
+    robot.follow(
+        steady_trajectory(robot.T, translate(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n)
+    )
     robot.stand()
 
 
 def _pull_out(robot: Robot, t: Transfer) -> int:
     """Backwards along the way of an insertion; returns which of the grips is in use at its end."""
     robot.stage = "lift"
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.floats), 0.01))
     if t.out.left is None:
-        robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.travel), _PULL))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, -t.out.travel), _PULL))
         return 0
-    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.left), _PULL))
-    part = shifted(t.T_world_start, t.out.way, -t.out.left)
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, -t.out.left), _PULL))
+    part = translate(t.T_world_start, t.out.way, -t.out.left)
     change_grip(robot, t, t.grips[0], t.grips[1], part @ t.grips[1].T_part_tip)
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
-    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.floats), 0.01))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
     return 1
 
 
 def _leave(robot: Robot, t: Transfer) -> None:
     """Off what the part touches at its side, before it is lifted."""
     if t.away:
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), 0.01))
     for side in t.away:
-        robot.follow(smooth(robot.T, shifted(robot.T, side, ASIDE_M), _LEAVE))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, side, ASIDE_M), _LEAVE))

@@ -2,7 +2,16 @@
 
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, hover, is_tilted
-from apo_bench.simulation.robot import Halt, Robot, led_there, shifted, smooth, way_there, weld, with_height
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    follow_waypoints,
+    plan_waypoints,
+    smooth_trajectory,
+    translate,
+    weld,
+    with_height,
+)
 
 _FREE = 2.0
 _NEAR = 0.8
@@ -20,30 +29,30 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = hover(at)
     least = max(above[2, 3], t.over)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
     level = with_height(above, robot.T[2, 3])
     # A short arm does not reach as far out as here where it waits, or has passed over other parts.
-    way = way_there(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
-    is_far = robot.arm.hand is not None and led_there(robot.scene.kinematics, robot.T, way, robot.q) is None
+    way = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
+    is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, way, robot.q) is None
     robot.go(with_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     if is_tilted(at):
-        robot.follow(smooth(robot.T, above, _NEAR))
-    robot.follow(smooth(robot.T, at, _NEAR))
+        robot.follow(smooth_trajectory(robot.T, above, _NEAR))
+    robot.follow(smooth_trajectory(robot.T, at, _NEAR))
     robot.stand()
     robot.forces.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
         weld(robot.scene, robot.data, t.part, True)
     else:
         robot.fingers(grip.half_width - robot.arm.squeeze_m)
-    robot.hold_watch = robot.hold_watch.grasp(robot.in_hand())
+    robot.slip_monitor = robot.slip_monitor.grasp(robot.in_hand())
     check_hold(robot, grip)
 
 
 def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
-    robot.hold_watch = robot.hold_watch.release(robot.in_hand())
+    robot.slip_monitor = robot.slip_monitor.release(robot.in_hand())
     if robot.scene.grasp == "weld":
         weld(robot.scene, robot.data, t.part, False)
     robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m))
@@ -52,9 +61,9 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
-    robot.follow(smooth(robot.T, shifted(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.forces.handle(None)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
 
 def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
@@ -80,11 +89,11 @@ def grasp_again(robot: Robot, grip: Grip) -> None:
         robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
         robot.stand()
         robot.fingers(grip.half_width - robot.arm.squeeze_m)
-        robot.hold_watch = robot.hold_watch.grasp(robot.in_hand())
+        robot.slip_monitor = robot.slip_monitor.grasp(robot.in_hand())
         check_hold(robot, grip)
 
 
 def check_hold(robot: Robot, grip: Grip) -> None:
     lost = _LOST_M if robot.arm.hand is None else max(_LOST_M, grip.half_width / 4)
     if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - lost:
-        raise Halt(robot.stage, "lost_grasp")
+        raise ExecutionAborted(robot.stage, "lost_grasp")

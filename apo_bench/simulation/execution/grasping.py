@@ -1,4 +1,4 @@
-"""Where to hold a part, chosen from the planned poses so that the gripper strikes nothing."""
+"""Choose from the planned poses where to hold a part, so that the gripper strikes nothing."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from apo_bench.geometry import (
 )
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import HasGripper, Obstacle, gripper_boxes, obstacle, shifted
+from apo_bench.simulation.robot import HasGripper, Obstacle, gripper_boxes, obstacle, translate
 from apo_bench.simulation.scene import Scene
 
 _STAND_OFF_M = 0.012
@@ -71,7 +71,7 @@ class Grips(NamedTuple):
 
 
 def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
-    """Every part but these, where it is believed to be."""
+    """Every part but these, where it is estimated to be."""
     return tuple(obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
 
 
@@ -104,7 +104,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
     Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
 
     Args:
-        places: Where the part is picked up or put down besides, clear for the grasp that is used there.
+        places: Where else the part is picked up or put down, clear for the grasp that is used there.
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
     solid = scene.scenario.assembly.solids[part]
@@ -167,7 +167,7 @@ def _pair(
     goal = RestingPart(stroke.T, stroke.around)
     last = list(_clear(scene, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
-        change = RestingPart(shifted(stroke.T, stroke.way, -left), stroke.around)
+        change = RestingPart(translate(stroke.T, stroke.way, -left), stroke.around)
         if 0.0 < left < _MOST_LEFT_M and any(_clear(scene, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
             for second in _clear(scene, solid, last, [change], margin):
@@ -233,7 +233,7 @@ def _clear(
     """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place, nor the
     closed one along any stroke.
 
-    They are worked out as they are asked for, some at a time, of these those of one direction and width together.
+    They are computed lazily, some at a time, of these those of one direction and width together.
     """
     T = places[0].T
 

@@ -27,15 +27,15 @@ _WRIST_ENDS = 2.5
 
 
 def transfer_grips(
-    scene: Scene, part: str, preferred: Grasp, out: ApproachLine, into: ApproachLine, believed: Poses, after: Poses
+    scene: Scene, part: str, preferred: Grasp, out: ApproachLine, into: ApproachLine, estimated: Poses, after: Poses
 ) -> tuple[tuple[Grip, ...], ApproachLine, ApproachLine]:
     """Where to hold the part, and both lines, out and into, with the place where the grip changes.
 
     Args:
-        believed: Where all parts are before the transfer.
+        estimated: Where all parts are before the transfer.
         after: Where all parts are after it.
     """
-    start = RestingPart(believed[part], obstacles(scene.scenario.assembly.solids, believed, (part,)))
+    start = RestingPart(estimated[part], obstacles(scene.scenario.assembly.solids, estimated, (part,)))
     goal = RestingPart(after[part], obstacles(scene.scenario.assembly.solids, after, (part,)))
     if into.level:
         stroke = Stroke(goal.T, into.way, into.travel, goal.around)
@@ -77,15 +77,15 @@ def centring_grips(
     return tuple(_grip(scene, part, grasp, place.T, place.T) for grasp in grasps)
 
 
-def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, believed: Poses) -> tuple[Grip, ...]:
+def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimated: Poses) -> tuple[Grip, ...]:
     """Grips across the level directions in which the part will have to be known and the grip itself does not settle it.
 
     All are turned from it the same way, by a quarter, unless the wrist ends there: a tip that is off on the hand then
-    puts every part off alike.
+    shifts every part by the same.
     """
     part = assembly.operations[k].main
-    T = believed[part]
-    place = RestingPart(T, obstacles(assembly.solids, believed, (part,)))
+    T = estimated[part]
+    place = RestingPart(T, obstacles(assembly.solids, estimated, (part,)))
     walls = [*own_walls(assembly, k, part), *later_walls(assembly, k, part)]
     pieces = physical_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
     rest = scene.kinematics.forward(scene.arm.home)

@@ -1,5 +1,6 @@
-"""From a plan to transfers: grasps, ways, guards, and whether the arm reaches them. Uses what is known before the robot
-moves, and nothing else.
+"""Prepare the transfers of a plan: grasps, lines, guards, and whether the arm reaches them.
+
+Only what is known before the robot moves is used.
 """
 
 from dataclasses import replace
@@ -20,8 +21,9 @@ from apo_bench.planning.insertion.surroundings import (
 )
 from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.execution.beside import beside_places, flush_pose
+from apo_bench.simulation.execution.flat_placement import find_flat_placement
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
+from apo_bench.simulation.execution.side_touches import find_side_touches
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,
     SAFE_M,
@@ -34,7 +36,7 @@ from apo_bench.simulation.execution.transfer import (
     key_poses,
     motions,
 )
-from apo_bench.simulation.robot import Trajectory, at_end, led_there, way_there
+from apo_bench.simulation.robot import Trajectory, at_end, follow_waypoints, plan_waypoints
 from apo_bench.simulation.scene import Scene
 
 _GRAVITY = 9.81
@@ -58,16 +60,16 @@ class Move(NamedTuple):
 
 
 @remembered
-def moves(plan: Plan, scene: Scene, spiral: bool = False, acts: tuple[str, ...] = ()) -> tuple[Move, ...]:
-    """What to do for each step of the schedule; what moves with a part is believed to stay with it.
+def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
+    """What to do for each step of the schedule; what moves with a part stays with it.
 
     Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
 
     Args:
-        searches: Whether the robot feels for a hole where a motion into it is stopped.
-        acts: What it does besides: `square` parts before it takes them, `lay` them flat before it inserts them.
+        spiral: Whether the robot searches for a hole where a motion into it is stopped.
+        actions: Of `PROBING_ACTIONS`: `square` parts before it takes them, `lay` them flat before it inserts them.
     """
-    believed: Poses = plan.start
+    estimated: Poses = plan.start
     put_by: dict[str, int | None] = {}
     """Part -> the operation that had put it where it is; none where it started."""
     before: dict[int, tuple[Array, int | None]] = {}
@@ -87,14 +89,14 @@ def moves(plan: Plan, scene: Scene, spiral: bool = False, acts: tuple[str, ...] 
         if step.undo:
             target, put_by[operation.main] = before.pop(k)
         else:
-            before.setdefault(k, (believed[operation.main], was))
+            before.setdefault(k, (estimated[operation.main], was))
             put_by[operation.main] = k
-        after = after_transfer(operation, target, believed)
-        transfer = _transfer(plan.assembly, scene, step, was, target, believed, after, spiral)
-        if acts and not (step.undo or transfer.carried):
-            transfer = _with_acts(plan.assembly, scene, k, transfer, believed, acts)
+        after = after_transfer(operation, target, estimated)
+        transfer = _transfer(plan.assembly, scene, step, was, target, estimated, after, spiral)
+        if actions and not (step.undo or transfer.carried):
+            transfer = _with_actions(plan.assembly, scene, k, transfer, estimated, actions)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
-        believed = after
+        estimated = after
     return tuple(prepared)
 
 
@@ -119,7 +121,7 @@ def _transfer(
     step: Step,
     was: int | None,
     target: Array,
-    believed: Poses,
+    estimated: Poses,
     after: Poses,
     spiral: bool,
 ) -> Transfer:
@@ -127,14 +129,14 @@ def _transfer(
 
     Args:
         was: The operation that had put the part where it is, None if it stands where it started.
-        target: Where its main part shall be, (4, 4).
-        believed: Where all parts are before it.
+        target: The target pose of its main part, (4, 4).
+        estimated: Where all parts are before it.
         after: Where all parts are after it.
     """
     k, undo = step
     operation = assembly.operations[k]
     part = operation.main
-    start = believed[part]
+    start = estimated[part]
     nominal = nominal_operations(scene.scenario)[k]
     leaves = nominal.after if undo or was == k else nominal.before
     comes = nominal.before if undo else nominal.after
@@ -145,9 +147,9 @@ def _transfer(
         into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
     out = arrival_line(leaves, start)
     preferred = scene.scenario.grasps[k if was is None or not out.level else was]
-    grips, out, into = transfer_grips(scene, part, preferred, out, into, believed, after)
+    grips, out, into = transfer_grips(scene, part, preferred, out, into, estimated, after)
     macros = motions(comes, target, slide_directions(assembly, comes, after))
-    top, bottom = ends_of(assembly, operation.moves, believed)
+    top, bottom = ends_of(assembly, operation.moves, estimated)
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
@@ -164,12 +166,12 @@ def _transfer(
         centring=() if undo or into.level else centring_grips(assembly, scene, k, grips[-1], macros, after),
         out=out,
         into=into,
-        departs=departure_motions(leaves, start, slide_directions(assembly, leaves, believed)),
+        departs=departure_motions(leaves, start, slide_directions(assembly, leaves, estimated)),
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
         slow=max(slow_before(assembly, comes, after, into.way), first + WALL_MARGIN_M),
-        mouths=ways,
+        entrances=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
         insert_n=_INSERT_WEIGHTS * min(near, default=held),
@@ -180,26 +182,28 @@ def _transfer(
 
 
 def holds_firmly(arm: Arm) -> bool:
-    """Whether a hand may carry a part past the first of several mouths at speed; the usual arm's may."""
+    """Whether a hand may carry a part past the first of several entrances at speed; the usual arm's may."""
     return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
 
 
-def _with_acts(
-    assembly: Assembly, scene: Scene, k: int, t: Transfer, believed: Poses, acts: tuple[str, ...]
+def _with_actions(
+    assembly: Assembly, scene: Scene, k: int, t: Transfer, estimated: Poses, actions: tuple[str, ...]
 ) -> Transfer:
-    """The transfer of a robot that feels, with what it does besides: a part that stands between others stays so."""
+    """The transfer with the probing actions; a part that stands between others stays so."""
     free = not (t.out.level or t.away or t.drawn)
-    squared = "square" in acts and free
-    laid = "lay" in acts and (t.into.level or (bool(t.mouths) and free))
-    flush = flush_pose(assembly, scene, t, believed) if laid else None
-    beside = () if flush is None or t.into.level else beside_places(assembly, scene, t, flush.T[:3, :3], believed)
+    squared = "square" in actions and free
+    laid = "lay" in actions and (t.into.level or (bool(t.entrances) and free))
+    flat = find_flat_placement(assembly, scene, t, estimated) if laid else None
+    side_touches = (
+        () if flat is None or t.into.level else find_side_touches(assembly, scene, t, flat.T[:3, :3], estimated)
+    )
     return replace(
         t,
-        in_last="search" in acts,
-        slow=t.slow if t.into.level else max(t.slow, max(t.mouths, default=0.0) + WALL_MARGIN_M),
-        squaring=squaring_grips(assembly, scene, k, t.grips[0], believed) if squared else (),
-        flush=flush,
-        beside=beside,
+        in_last="search" in actions,
+        slow=t.slow if t.into.level else max(t.slow, max(t.entrances, default=0.0) + WALL_MARGIN_M),
+        squaring=squaring_grips(assembly, scene, k, t.grips[0], estimated) if squared else (),
+        flat=flat,
+        side_touches=side_touches,
     )
 
 
@@ -252,8 +256,8 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     if len(reached) == len(taken + put) and scene.arm.hand is not None:
         # What is held goes through the air from the last of the first to the first of the others.
         k = len(taken)
-        way = way_there(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
-        if led_there(scene.kinematics, taken[-1], way, reached[k - 1]) is None:
+        way = plan_waypoints(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
+        if follow_waypoints(scene.kinematics, taken[-1], way, reached[k - 1]) is None:
             reached = reached[:k]
     if len(reached) == len(taken + put):
         return KeyAngles("", tuple(reached), q)

@@ -1,6 +1,6 @@
-"""Replays that begin alike share their beginning: the state after each part of a move, kept and taken up again.
+"""Cache the states of replays, so that replays with the same beginning share it.
 
-MuJoCo goes on from a state exactly, so a result does not depend on what is kept.
+MuJoCo goes on from a state exactly, so a result does not depend on the cache.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from apo_bench.assembly import Poses, ReplayResult, Snapshot, Step
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot import Robot
-from apo_bench.simulation.scene import awaken
+from apo_bench.simulation.scene import wake
 
 _MOST = 4096
 """States, and results, that are kept, 5 kB each; the oldest go first."""
@@ -43,23 +43,23 @@ class SavedState(NamedTuple):
     progress: Progress
 
 
-def saved_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
+def save_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
     """The present state; nothing sleeps in it, nor now."""
     model = robot.model
     data = robot.data
-    awaken(robot.scene.work, data)
+    wake(robot.scene.work, data)
     state = np.zeros(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
     reached = Progress([*progress.after], [*progress.timeline])
     return SavedState(state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, reached)
 
 
-def take_up(saved: SavedState, robot: Robot) -> None:
+def restore_state(saved: SavedState, robot: Robot) -> None:
     """Bring a robot, and all around it, to a state that was saved."""
     robot.model.eq_data[:] = saved.welds
     mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
     robot.data.sensordata[:] = saved.sensors
-    awaken(robot.scene.work, robot.data)
+    wake(robot.scene.work, robot.data)
     robot.remember(saved.robot)
 
 
@@ -76,17 +76,17 @@ class ReplayCache:
         return self._results.get(key)
 
     def end(self, key: bytes, result: ReplayResult) -> None:
-        """Keep the result of a replay under all that has led to it."""
+        """Keep the result of a replay under its key."""
         self._results[key] = result
         _drop_oldest(self._results)
 
     def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
-        """Keep the present state under what has led to it; nothing sleeps in it."""
+        """Keep the present state under its key; nothing sleeps in it."""
         if key not in self._states:
-            self._states[key] = saved_state(robot, grip, progress)
+            self._states[key] = save_state(robot, grip, progress)
             _drop_oldest(self._states)
         else:
-            awaken(robot.scene.work, robot.data)
+            wake(robot.scene.work, robot.data)
 
     def resume(self, keys: Sequence[bytes], robot: Robot, progress: Progress) -> tuple[int, int]:
         """Take up the furthest state that was kept.
@@ -97,7 +97,7 @@ class ReplayCache:
         for i in range(len(keys), 0, -1):
             saved = self._states.get(keys[i - 1])
             if saved is not None:
-                take_up(saved, robot)
+                restore_state(saved, robot)
                 progress.after[:] = saved.progress.after
                 progress.timeline[:] = saved.progress.timeline
                 return i, saved.grip
@@ -112,7 +112,7 @@ def _drop_oldest(kept: dict[bytes, Any]) -> None:
 def cache_keys(
     scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]], error: Any = None
 ) -> list[bytes]:
-    """What has led to each state: two keys for each move, one when the part is lifted, one when the move is done."""
+    """A key of the past of each state: two for each move, one when the part is lifted, one when the move is done."""
     digest = hashlib.sha256(
         _bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity, error))
     )

@@ -1,4 +1,4 @@
-"""What the controller needs to know to move one part, with what it carries: grips, lines, macros, guards."""
+"""The transfer of one part, with what it carries: grips, lines, macros, guards."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final
@@ -10,7 +10,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.arrival import Arrival, Attach
 from apo_bench.planning.insertion.macros import MacroName
 from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
-from apo_bench.simulation.robot import shifted, with_height
+from apo_bench.simulation.robot import translate, with_height
 
 _AHEAD_M = 0.01
 """A motion from above is guarded from so far above where it turns slow."""
@@ -21,7 +21,7 @@ _HOVER_M = 0.11
 _STRAIGHT = 0.99
 _DOWN = float(np.cos(np.radians(10.0)))
 ASIDE_M = 0.006
-"""A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
+"""A slide begins this far from the side that it will touch; what touches at its side is moved off as far before it is
 lifted, since in the hand it drifts into its neighbour."""
 
 
@@ -37,7 +37,7 @@ class Grip(NamedTuple):
     """Half the part's width between the fingers, [m]."""
 
     def with_tip_at(self, T: Array) -> "Grip":
-        """The grip of a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
+        """The grip of a tip that comes to be at T, (4, 4), in the frame of where the robot estimates it."""
         return Grip(self.T_part_tip @ T, self.half_width)
 
 
@@ -91,7 +91,7 @@ class Transfer:
     """Height of the tip at which the part is carried over everything that stands, [m]."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
-    mouths: tuple[float, ...]
+    entrances: tuple[float, ...]
     """So far before the goal the part comes to where walls begin that it goes between, [m]."""
     weight_n: float
     """The weight of the part and what it carries, [N]."""
@@ -107,12 +107,12 @@ class Transfer:
     """Whether a motion from above that comes between the last walls only half of their way is searched on, and not one
     that comes half of the way of all."""
     squaring: tuple[Grip, ...] = ()
-    """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
-    flush: Any = None
-    """A `Flush`: the part laid flat, below where a level insertion begins, or where it stood before one from above;
-    None where it cannot or need not."""
-    beside: tuple[Any, ...] = ()
-    """Each a `Beside`: where the part touches a wall with its side, before an insertion from above."""
+    """Before it is taken, the fingers close and open again here, at its start; none without probing."""
+    flat: Any = None
+    """A `FlatPlacement`: the part laid flat, below where a level insertion begins, or where it stood before one from
+    above; None where it cannot or need not."""
+    side_touches: tuple[Any, ...] = ()
+    """Each a `SideTouch`: where the part touches a wall with its side, before an insertion from above."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
@@ -123,6 +123,11 @@ class Transfer:
         return min(self.into.travel, self.slow + _AHEAD_M) if self.into.way[2] < -_STRAIGHT else self.into.travel
 
     @property
+    def foremost(self) -> Array:
+        """`front`, or the origin of the part where no hole is searched for, (3,), [m]."""
+        return np.zeros(3) if self.front is None else self.front
+
+    @property
     def depth(self) -> float:
         """How deep a motion from above goes between walls, [m]."""
         return self.slow - WALL_MARGIN_M
@@ -130,7 +135,7 @@ class Transfer:
     @property
     def stuck(self) -> float:
         """A motion from above that is stopped farther than this before its end has not found its hole, [m]."""
-        return min(self.mouths) / 2 if self.in_last and self.mouths else self.depth / 2
+        return min(self.entrances) / 2 if self.in_last and self.entrances else self.depth / 2
 
     @property
     def sides(self) -> tuple[Array, ...]:
@@ -153,7 +158,7 @@ class Transfer:
         return 0.5 * self.clearance
 
     def with_tip_at(self, T: Array) -> "Transfer":
-        """The transfer with a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
+        """The transfer with a tip that comes to be at T, (4, 4), in the frame of where the robot estimates it."""
         if np.array_equal(T, np.eye(4)):
             return self
         grips = tuple(grip.with_tip_at(T) for grip in self.grips)
@@ -168,8 +173,8 @@ def after_transfer(operation: Operation, target: Array, poses: Poses) -> Poses:
 
 
 def first_contact_pose(t: Transfer) -> Array:
-    """Where the part first comes down: at its goal, or aside of what it shall touch."""
-    return shifted(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
+    """Where the part first comes down: at its goal, or aside of what it will touch."""
+    return translate(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
 
 
 def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -179,8 +184,8 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
     pick = t.T_world_start @ first
     goal = t.T_world_goal @ last
-    free = shifted(t.T_world_start @ carrying, t.out.way, -t.out.travel)
-    before = shifted(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
+    free = translate(t.T_world_start @ carrying, t.out.way, -t.out.travel)
+    before = translate(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
     above, over = (with_height(T, max(t.safe, T[2, 3])) for T in (free, before))
     return (hover(pick), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
@@ -193,7 +198,7 @@ def is_tilted(T_tip: Array) -> bool:
 def hover(grasp: Array) -> Array:
     """Where the tip comes to a stand before it goes on to a grasp: above it, of a tilted one straight back."""
     if is_tilted(grasp):
-        return shifted(grasp, grasp[:3, 2], -_HOVER_M)
+        return translate(grasp, grasp[:3, 2], -_HOVER_M)
     return with_height(grasp, float(grasp[2, 3]) + _HOVER_M)
 
 
@@ -205,7 +210,7 @@ def arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
 
 
 def motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The macros in the world, for a part that arrives at T; slides as they are believed to be."""
+    """The macros in the world, for a part that arrives at T; slides as they are estimated to be."""
     straight = [macro for macro in arrival.macros if macro.name != "slide-to-contact"]
     turned = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in straight]
     return (*turned, *(Motion("slide-to-contact", side) for side in sides))

@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.simulation.film.caption import Caption, Picture, add_caption
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.film.track import Chapter, FilmMoment
+from apo_bench.simulation.film.track import FilmMoment, Segment
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING
 from apo_bench.simulation.scene import camera_view, initial_state, place_for_picture, save_film
@@ -23,14 +23,14 @@ _INSET = (192, 128)
 _SPEED = 2.0
 _FPS = 20.0
 _GIF_FPS = 8.0
-_ENDING_S = 2.5  # so long the end of a chapter stands still, with what came of it
+_ENDING_S = 2.5  # so long the end of a segment stands still, with what came of it
 _HEADROOM_M = 0.04  # seen above the parts, for what comes down
 FILM_AZIMUTH_DEG = 128.0
 FILM_ELEVATION_DEG = -24.0
 
 
-def write_film(assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], path: str | Path) -> None:
-    """Write chapters one after the other as MP4 or GIF, by the ending of `path`.
+def write_film(assembly: Assembly, assembled: Poses, segments: Sequence[Segment], path: str | Path) -> None:
+    """Write segments one after the other as MP4 or GIF, by the ending of `path`.
 
     Args:
         assembled: Where the parts are when all is done: the camera looks at them.
@@ -39,12 +39,12 @@ def write_film(assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter]
         InputError: Another ending, a place that cannot be written, or there is nothing to draw with.
     """
     fps = _GIF_FPS if Path(path).suffix.lower() == ".gif" else _FPS
-    timed = frames(assembly, assembled, chapters, fps=fps)
+    timed = frames(assembly, assembled, segments, fps=fps)
     save_film((picture for picture, seconds in timed for _ in range(round(seconds * fps))), path, fps)
 
 
 def frames(
-    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], speed: float = _SPEED, fps: float = _FPS
+    assembly: Assembly, assembled: Poses, segments: Sequence[Segment], speed: float = _SPEED, fps: float = _FPS
 ) -> Iterator[tuple[Picture, float]]:
     """The pictures of a film one after the other, and how long each is shown, [s].
 
@@ -53,32 +53,32 @@ def frames(
         speed: How many times as fast as it was it is shown; stated in the picture.
     """
     pace = "real time" if speed == 1.0 else f"x {speed:g}"
-    for chapter in chapters:
+    for segment in segments:
         with ExitStack() as stack:
             views = []
-            for size, states in ((_SIZE, [assembled]), (_INSET, [assembled, chapter.start])):
+            for size, states in ((_SIZE, [assembled]), (_INSET, [assembled, segment.start])):
                 framing = frame_parts(assembly, states, headroom_m=_HEADROOM_M)
                 camera = camera_view(*framing, FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)
-                views.append((stack.enter_context(renderer(chapter.world.model, *size)), camera))
-            data = initial_state(chapter.world, chapter.start)
-            for moment, force_n, most_n in sampled(chapter.moments, speed / fps):
-                empty = moment.doing.macro in (BY_HAND, TOUCHING)
+                views.append((stack.enter_context(renderer(segment.world.model, *size)), camera))
+            data = initial_state(segment.world, segment.start)
+            for moment, force_n, most_n in sample_moments(segment.moments, speed / fps):
+                empty = moment.phase.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"
-                caption = Caption(chapter.title, pace, _lines(assembly, moment), force)
-                yield _draw(chapter, data, moment, views, caption), 1.0 / fps
-            ending = tuple(textwrap.wrap(chapter.ending, _LETTERS, max_lines=2, placeholder=" .."))
-            caption = Caption(chapter.title, pace, ending, good=chapter.good)
-            yield _draw(chapter, data, chapter.moments[-1], views, caption), _ENDING_S
+                caption = Caption(segment.title, pace, _lines(assembly, moment), force)
+                yield _draw(segment, data, moment, views, caption), 1.0 / fps
+            ending = tuple(textwrap.wrap(segment.ending, _LETTERS, max_lines=2, placeholder=" .."))
+            caption = Caption(segment.title, pace, ending, good=segment.good)
+            yield _draw(segment, data, segment.moments[-1], views, caption), _ENDING_S
 
 
 def _draw(
-    chapter: Chapter, data: Any, moment: FilmMoment, views: Sequence[tuple[Any, Any]], caption: Caption
+    segment: Segment, data: Any, moment: FilmMoment, views: Sequence[tuple[Any, Any]], caption: Caption
 ) -> Picture:
     """A moment as both renderers see it through their cameras, the large one first."""
     data.qpos[:] = moment.qpos
     if len(moment.hands):
         data.mocap_pos[:] = moment.hands
-    place_for_picture(chapter.world.model, data)
+    place_for_picture(segment.world.model, data)
     pictures = []
     for draws, camera in views:
         draws.update_scene(data, camera=camera)
@@ -87,18 +87,18 @@ def _draw(
     return add_caption(pictures[0], pictures[1], caption)
 
 
-def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
+def sample_moments(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
     """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
     since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
     at = -np.inf
     force = 0.0
     most = 0.0
-    operation = moments[0].doing.operation
+    operation = moments[0].phase.operation
     for moment in moments:
-        if moment.doing.operation != operation:
-            operation = moment.doing.operation
+        if moment.phase.operation != operation:
+            operation = moment.phase.operation
             most = 0.0
-        force = max(force, moment.doing.force_n)
+        force = max(force, moment.phase.force_n)
         most = max(most, force)
         if moment.time_s >= at or moment is moments[-1]:
             yield moment, force, most
@@ -108,19 +108,19 @@ def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[Fil
 
 def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
-    k = moment.doing.operation
+    k = moment.phase.operation
     if k is None:
-        return "the closed hand touches what is fixed" if moment.doing.macro == TOUCHING else "at the start"
+        return "the closed hand touches what is fixed" if moment.phase.macro == TOUCHING else "at the start"
     operation = assembly.operations[k]
     carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
-    undone = " undone" * moment.doing.undoes
-    return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.doing.macro}"
+    undone = " undone" * moment.phase.undoes
+    return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.phase.macro}"
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
     """What is done, and the contacts that it makes."""
     words = operation_words(assembly, moment)
-    if moment.doing.operation is None:
+    if moment.phase.operation is None:
         return (words,)
-    contacts = "; ".join(map(str, assembly.operations[moment.doing.operation].contacts))
+    contacts = "; ".join(map(str, assembly.operations[moment.phase.operation].contacts))
     return (words, textwrap.shorten(contacts, _LETTERS, placeholder=" .."))

@@ -1,4 +1,4 @@
-"""What is laid over one moment: goals, hands and names of faces."""
+"""Draw over one moment: poses of parts, hands and names of faces."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -8,8 +8,8 @@ import numpy as np
 
 from apo_bench.assembly import PartFace, Poses
 from apo_bench.geometry import Array, Face, pose
-from apo_bench.simulation.film.track import Chapter, FilmMoment, part_poses
-from apo_bench.simulation.scene import Scene, place
+from apo_bench.simulation.film.track import FilmMoment, Segment, part_poses
+from apo_bench.simulation.scene import Scene, set_part_pose
 
 Color = tuple[float, float, float]
 HAND_M = 0.012
@@ -19,7 +19,7 @@ _OFF_M = 0.004  # how far before a flat face its name stands
 
 
 class Overlay(NamedTuple):
-    """Parts drawn once more, where they are believed or should be."""
+    """Parts drawn once more, at their estimated or true poses."""
 
     poses: Poses
     color: Color
@@ -28,7 +28,7 @@ class Overlay(NamedTuple):
 class Snapshot(NamedTuple):
     """One moment with what is laid over it."""
 
-    chapter: Chapter
+    segment: Segment
     moment: FilmMoment
     words: tuple[str, ...]
     faces: tuple[PartFace, ...]
@@ -42,7 +42,7 @@ def draw_over(scene: Scene, snapshot: Snapshot, drawn: Any) -> None:
         _draw_parts(scene, overlay, drawn)
     for hand in snapshot.moment.hands:
         _geom(drawn, mujoco.mjtGeom.mjGEOM_SPHERE, HAND_M, hand, (*HAND_COLOR, 0.8))
-    poses = part_poses(snapshot.chapter, snapshot.moment)
+    poses = part_poses(snapshot.segment, snapshot.moment)
     for face in snapshot.faces:
         at = pose.apply(poses[face.part], label_place(scene, face)[None])[0]
         named = _geom(drawn, mujoco.mjtGeom.mjGEOM_LABEL, 0.01, at, (0.1, 0.1, 0.1, 1.0))
@@ -63,7 +63,7 @@ def _draw_parts(scene: Scene, overlay: Overlay, drawn: Any) -> None:
     data = mujoco.MjData(world.model)
     for part, T in overlay.poses.items():
         if part in world.qpos:
-            place(world, data, part, T)
+            set_part_pose(world, data, part, T)
     mujoco.mj_kinematics(world.model, data)
     begin = drawn.ngeom
     dynamic = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)

@@ -39,7 +39,7 @@ class Shape(NamedTuple):
 def shapes_of(scene: Scene, data: Any, snapshot: Snapshot) -> Iterator[Shape]:
     """Everything that is to be seen, planes excepted; `data` is brought to that moment."""
     model = scene.work.model
-    show_moment(scene, data, snapshot.chapter, snapshot.moment)
+    show_moment(scene, data, snapshot.segment, snapshot.moment)
     drawn = mujoco.MjvScene(model, maxgeom=_MOST_GEOMS)
     every = int(mujoco.mjtCatBit.mjCAT_ALL)
     mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera(), every, drawn)

@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses, placements
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.simulation.hooks import Doing, Hooks
-from apo_bench.simulation.scene import Scene, World, arm_home, initial_state, place, place_for_picture
+from apo_bench.simulation.hooks import Hooks, Phase
+from apo_bench.simulation.scene import Scene, World, arm_home, initial_state, place_for_picture, set_part_pose
 
 _NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 _IN_PLACE = "in place"
@@ -19,14 +19,14 @@ class FilmMoment(NamedTuple):
 
     time_s: float
     qpos: Array
-    doing: Doing
+    phase: Phase
     hands: Array
     """Where the hands of the human are, (2, 3), [m]; of a replay (0, 3)."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Chapter:
+class Segment:
     """A demonstration or a replay from its beginning to its end."""
 
     title: str
@@ -37,7 +37,7 @@ class Chapter:
     ending: str
     """What came of it, in a sentence."""
     good: bool | None
-    """Whether that is a success; None where nobody asks."""
+    """Whether that is a success; None of what has no verdict."""
 
 
 @final
@@ -56,37 +56,37 @@ class FilmTrack:
     def _begin(self, plan: Plan) -> None:
         self.plan = plan
 
-    def _keep(self, data: Any, doing: Doing) -> None:
-        self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))
+    def _keep(self, data: Any, phase: Phase) -> None:
+        self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), phase, np.array(data.mocap_pos)))
 
 
-def scenario_chapter(scene: Scene, start: Poses, goals: Array) -> Chapter:
-    """What a scenario asks for: the parts before the first operation and after each, a second apart."""
+def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
+    """The nominal assembly of a scenario: the parts before the first operation and after each, a second apart."""
     world = scene.work
     data = initial_state(world, start)
     moments = list[FilmMoment]()
     arm_home(scene, data)
     for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
-            place(world, data, part, poses[part])
-        doing = Doing(None if k < 0 else k, _IN_PLACE, 0.0)
-        moments.append(FilmMoment(k + 1.0, np.array(data.qpos), doing, _NO_HANDS))
-    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
+            set_part_pose(world, data, part, poses[part])
+        phase = Phase(None if k < 0 else k, _IN_PLACE, 0.0)
+        moments.append(FilmMoment(k + 1.0, np.array(data.qpos), phase, _NO_HANDS))
+    return Segment(f"{scene.scenario.name}: as the scenario states it", world, start, tuple(moments), "", None)
 
 
-def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
+def part_poses(segment: Segment, moment: FilmMoment) -> Poses:
     """Where every part is, world frame, [m]."""
-    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in chapter.world.qpos.items()}
-    return {**{part: chapter.start[part] for part in chapter.world.fixed}, **free}
+    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in segment.world.qpos.items()}
+    return {**{part: segment.start[part] for part in segment.world.fixed}, **free}
 
 
-def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -> None:
+def show_moment(scene: Scene, data: Any, segment: Segment, moment: FilmMoment) -> None:
     """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
-    if chapter.world is scene.work:
+    if segment.world is scene.work:
         data.qpos[:] = moment.qpos
     else:
         arm_home(scene, data)
-        for part, T in part_poses(chapter, moment).items():
+        for part, T in part_poses(segment, moment).items():
             if part in scene.work.qpos:
-                place(scene.work, data, part, T)
+                set_part_pose(scene.work, data, part, T)
     place_for_picture(scene.work.model, data)

@@ -22,8 +22,8 @@ WINDOW_KEYS = {
     263: "previous",
     264: "next operation",
     265: "previous operation",
-    267: "next chapter",
-    266: "previous chapter",
+    267: "next segment",
+    266: "previous segment",
     268: "faces",
     269: "goals",
 }
@@ -53,17 +53,17 @@ def step_in_window(
     press: Callable[[str], None],
     pass_time: Callable[[float], None],
 ) -> None:
-    """Open the window and show what is asked for until a person closes it.
+    """Open the window and show snapshots until a person closes it.
 
     Args:
         assembled: What the camera looks at.
-        now: What is to be shown.
-        press: Told what a key means, one of `WINDOW_KEYS`.
-        pass_time: Told how many seconds have passed.
+        now: The snapshot to show.
+        press: Called with what a key means, one of `WINDOW_KEYS`.
+        pass_time: Called with how many seconds have passed.
     """
     import mujoco.viewer
 
-    data = initial_state(scene.work, now().chapter.start)
+    data = initial_state(scene.work, now().segment.start)
     pressed: list[str] = []
 
     def on_key(code: int) -> None:
@@ -90,10 +90,10 @@ def step_in_window(
 
 
 def _draw(scene: Scene, data: Any, snapshot: Snapshot, window: Any) -> None:
-    show_moment(scene, data, snapshot.chapter, snapshot.moment)
+    show_moment(scene, data, snapshot.segment, snapshot.moment)
     window.user_scn.ngeom = 0
     draw_over(scene, snapshot, window.user_scn)
     font = mujoco.mjtFontScale.mjFONTSCALE_150
     place = mujoco.mjtGridPos
-    words = "\n".join((snapshot.chapter.title, *snapshot.words))
+    words = "\n".join((snapshot.segment.title, *snapshot.words))
     window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, _KEYS, _MEANINGS)])

@@ -11,9 +11,9 @@ import numpy as np
 from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
-from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
+from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
 from apo_bench.simulation.robot import TINY_S, Moving, Trajectory, near_spans, take_along
-from apo_bench.simulation.scene import HANDS, Scene, initial_state, part_pose, sleeping
+from apo_bench.simulation.scene import HANDS, Scene, allow_sleep, initial_state, part_pose
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
@@ -40,7 +40,7 @@ class Hands:
         self.world = scene.shown
         self.data: Any = initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
-        self._hooks = hooks_of(watch)
+        self._hooks = as_hooks(watch)
         self._operation: int | None = None
         self._steps = 0
         self._every = max(1, round(self._hooks.tick_s / self._step_s))
@@ -50,12 +50,12 @@ class Hands:
         self._held: list[dict[str, Array]] = [{} for _ in HANDS]
 
     def begin(self, operation: int) -> None:
-        """Say which operation begins, counted from 0, to who wants to know."""
+        """Call the hook before an operation, counted from 0."""
         self._operation = operation
         self._hooks.before_step(Step(operation))
 
     def end(self, operation: int) -> None:
-        """Say which operation has ended, counted from 0, to who wants to know."""
+        """Call the hook after an operation, counted from 0."""
         self._hooks.after_step(Step(operation))
 
     def pose(self, part: str) -> Array:
@@ -106,7 +106,7 @@ class Hands:
         What was just let go hung still in the hand, and is kept awake until it falls.
         """
         steps = round(seconds / self._step_s)
-        with sleeping(self.world, False):
+        with allow_sleep(self.world, False):
             self._step(min(_LOOK_STEPS, steps))
         for done in range(_LOOK_STEPS, steps, _LOOK_STEPS):
             if self.data.ntree_awake == 0:
@@ -148,7 +148,7 @@ class Hands:
             self._step(1)
 
     def _step(self, n: int) -> None:
-        """Step, and let who watches look whenever it is time."""
+        """Step, and call the hook after every tick."""
         while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
             self._tick(self.data)
@@ -162,7 +162,7 @@ class Hands:
         """Let time pass that is not simulated.
 
         Args:
-            put: Makes of the present state what it will be so many steps later; who watches is shown that in a copy.
+            put: Makes of the present state what it will be so many steps later; the hook gets that in a copy.
         """
         if self._hooks.after_tick is not None:
             for i in range(self._every - self._steps, steps + 1, self._every):
@@ -174,9 +174,9 @@ class Hands:
         self._after(self.data, steps, put)
 
     def _tick(self, data: Any) -> None:
-        """Let who watches look."""
+        """Call the hook after a tick."""
         if self._hooks.after_tick is not None:
-            self._hooks.after_tick(data, Doing(self._operation, BY_HAND, 0.0))
+            self._hooks.after_tick(data, Phase(self._operation, BY_HAND, 0.0))
 
     def _after(self, data: Any, steps: int, put: Callable[[Any, int], None]) -> None:
         put(data, steps)

@@ -1,29 +1,29 @@
-"""The arm in motion: lines followed, contacts felt."""
+"""The arm in motion: it follows lines and measures contact forces."""
 
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
+from apo_bench.simulation.robot.forces import Guard, LowPass
 from apo_bench.simulation.robot.gripper import ArmAlone, HasGripper, gripper_boxes
-from apo_bench.simulation.robot.in_hand import TINY_S, HoldWatch, take_along, weld
+from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
 from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, obstacle
 from apo_bench.simulation.robot.paths import (
     Trajectory,
     minimum_jerk,
-    paced,
-    shifted,
-    smooth,
-    steady,
+    paced_trajectory,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
     turn_from,
     with_height,
 )
-from apo_bench.simulation.robot.reach import at_end, led_there, way_there
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot.reach import at_end, follow_waypoints, plan_waypoints
+from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import (
     BANDWIDTH_HZ,
     READING_S,
-    Guard,
-    LowPass,
     WristSensor,
-    felt_noise,
+    filtered_noise,
     low_pass_part,
     part_loads,
 )
@@ -33,10 +33,10 @@ __all__ = (
     "READING_S",
     "TINY_S",
     "ArmAlone",
+    "ExecutionAborted",
+    "GraspSlipMonitor",
     "Guard",
-    "Halt",
     "HasGripper",
-    "HoldWatch",
     "LowPass",
     "Moving",
     "Obstacle",
@@ -46,24 +46,24 @@ __all__ = (
     "WristSensor",
     "at_end",
     "comply",
-    "felt_noise",
+    "filtered_noise",
+    "follow_waypoints",
     "gripper_boxes",
-    "led_there",
     "low_pass_part",
     "minimum_jerk",
     "near_spans",
     "obstacle",
-    "paced",
+    "paced_trajectory",
     "part_loads",
+    "plan_waypoints",
     "press",
     "reading",
     "servo",
-    "shifted",
-    "smooth",
-    "steady",
+    "smooth_trajectory",
+    "steady_trajectory",
     "take_along",
+    "translate",
     "turn_from",
-    "way_there",
     "weld",
     "with_height",
     "wrist_of",

@@ -1,6 +1,6 @@
-"""Motions that depend on what is felt: by the force on the part in the hand, or by the sensor at the wrist.
+"""Motions that depend on force: on the part in the hand, or by the sensor at the wrist.
 
-Nothing is left out while the wrist feels: its motions are simulated in full at either fidelity.
+Nothing is left out while the sensor reads: these motions are simulated in full at either fidelity.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,11 +10,12 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.records import ft_noise
-from apo_bench.simulation.robot.paths import Trajectory, shifted
-from apo_bench.simulation.robot.reach import turned_by
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.paths import Trajectory, translate
+from apo_bench.simulation.robot.reach import joint_gradients
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, Guard, WristSensor, hand_load
-from apo_bench.simulation.scene import wrist_felt
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
+from apo_bench.simulation.scene import wrist_sensors_on
 
 ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
@@ -29,27 +30,27 @@ _FAR_RAD = 0.0025
 
 
 def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
-    """Shift the tip a little, step by step, as the force on the part in the hand has it.
+    """Shift the tip a little, step by step, by the force on the part in the hand.
 
     Args:
-        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
+        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip moves off
             where it began, (3,) world, [m], or None to end.
 
     Raises:
-        Halt: The arm does not reach around there, or something went wrong on the way.
+        ExecutionAborted: The arm does not reach around there, or something went wrong on the way.
     """
     q = robot.q
     offset = np.zeros(3)
-    ends = [(shifted(robot.T, axis, -_SHIFT_M), shifted(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
-    J_inverse = robot.reached(turned_by(robot.scene.kinematics, ends, q, _SHIFT_M))
+    ends = [(translate(robot.T, axis, -_SHIFT_M), translate(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
+    J_inverse = robot.reached(joint_gradients(robot.scene.kinematics, ends, q, _SHIFT_M))
     force: Sequence[float] = robot.forces.net()
     passed = 0
     while (wanted := law(force)) is not None:
         offset = wanted
         passed += 1
-        force = robot.nudge(q + offset @ J_inverse, passed)
+        force = robot.servo_step(q + offset @ J_inverse, passed)
     robot.q = q + offset @ J_inverse
-    robot.T = shifted(robot.T, offset, 1.0)
+    robot.T = translate(robot.T, offset, 1.0)
 
 
 def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
@@ -71,7 +72,7 @@ def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
     robot.wrist, robot.fidelity = wrist, "full"
     wrist.begin(hand_load(robot.scene.kinematics, robot.arm, robot.opening()))
     try:
-        with wrist_felt(robot.model):
+        with wrist_sensors_on(robot.model):
             robot.wait(_SETTLE_S)
             yield
     finally:
@@ -82,7 +83,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
     """Stand still in free air; what the sensor shows on average, but for the known weights, is nothing from now on.
 
     Raises:
-        Halt: Something went wrong meanwhile.
+        ExecutionAborted: Something went wrong meanwhile.
     """
     with reading(robot, wrist):
         robot.stand()
@@ -104,26 +105,26 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
 
     Returns:
         What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
-        its end, and nothing was felt.
+        its end, and nothing was met.
 
     Raises:
-        Halt: The line leaves the arm's reach, or something went wrong on the way.
+        ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
     """
     with reading(robot, wrist):
         return robot.follow(line, Guard(way, newton)) or None
 
 
 def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
-    """Move the hand a little, reading by reading, as the wrench has it: `servo` in six directions.
+    """Move the hand a little, reading by reading, by the wrench: `servo` in six directions.
 
     Args:
         law: Called at each reading (`READING_S`) with the filtered wrench, (6,), [N] and [Nm], world, about the point
-            where it is then; returns how far the hand shall be off where it began, (6,): the shift of the point, [m],
+            where it is then; returns how far the hand moves off where it began, (6,): the shift of the point, [m],
             and a rotation vector about it, [rad], world; or None to end.
         about: The point, (3,), world, [m]; it moves with the hand.
 
     Raises:
-        Halt: The arm does not reach around there, or something went wrong on the way.
+        ExecutionAborted: The arm does not reach around there, or something went wrong on the way.
     """
     with reading(robot, wrist):
         q = robot.q
@@ -137,7 +138,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
             taken = False
             while not taken:
                 passed += 1
-                robot.nudge(q, passed)
+                robot.servo_step(q, passed)
                 taken = wrist.take(robot.step_s)
             far = np.abs(offset - looked)
             if far[:3].max() > _FAR_M or far[3:].max() > _FAR_RAD:
@@ -155,5 +156,5 @@ def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
     turns = []
     for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
         ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
-        turns.append(robot.reached(turned_by(robot.scene.kinematics, ends, q, by)))
+        turns.append(robot.reached(joint_gradients(robot.scene.kinematics, ends, q, by)))
     return np.vstack(turns)

@@ -1,4 +1,4 @@
-"""The gripper of a scene: the room that it takes, and its fingers, where they are and what they are commanded to.
+"""The gripper of a scene: the room that it takes, its fingers and their commands.
 
 Openings are of each finger, [m].
 """
@@ -13,12 +13,13 @@ import numpy as np
 from apo_bench.geometry import Array, Box
 from apo_bench.simulation.arms.arm import Arm, Hand
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.arms.rig import below
+from apo_bench.simulation.arms.shapes import below
+from apo_bench.simulation.frames import frame
 
 _UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""
 STUCK_M = 0.002
-"""Fingers that open do not rest while they are so far from where they shall be: they stick to a part, or start late."""
+"""Fingers that open do not rest while they are so far from their command: they stick to a part, or start late."""
 _LONGEST_S = 0.2
 """How long fingers of a stiff drive may take to rest behind their command."""
 
@@ -39,6 +40,18 @@ class ArmAlone(NamedTuple):
     kinematics: Kinematics
 
 
+def open_hand(kinematics: Kinematics, arm: Arm, opening: float) -> tuple[Any, Array]:
+    """The arm alone with its hand at an opening, as `MjData`, and the tip there, (4, 4)."""
+    model = kinematics.model
+    data = mujoco.MjData(model)
+    for finger, joint in zip(arm.fingers, arm.finger_joints(opening), strict=True):
+        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = joint
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    tip = model.site(arm.tip).id
+    return data, frame(data.site_xmat[tip], data.site_xpos[tip])
+
+
 @lru_cache(maxsize=64)
 def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
     """The geoms of the gripper that can touch something, in the frame of the tip, each as the box around it.
@@ -47,13 +60,8 @@ def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: floa
         margin: Added on every level side, [m]; above and below, `_UPRIGHT_M` is.
     """
     model = kinematics.model
-    data = mujoco.MjData(model)
-    for finger, joint in zip(arm.fingers, arm.finger_joints(opening), strict=True):
-        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = joint
-    mujoco.mj_kinematics(model, data)
-    tip = model.site(arm.tip).id
-    R = data.site_xmat[tip].reshape(3, 3)
-    p = data.site_xpos[tip]
+    data, T_tip = open_hand(kinematics, arm, opening)
+    R = T_tip[:3, :3]
     hanging = below(model, model.body(arm.mount).id)
     touching = (model.geom_contype | model.geom_conaffinity) != 0
     boxes = []
@@ -61,7 +69,7 @@ def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: floa
         if touching[g] and int(model.geom_bodyid[g]) in hanging:
             # The half sizes of the box around a turned box are |R| times its own.
             R_tip_geom = R.T @ data.geom_xmat[g].reshape(3, 3)
-            at = R.T @ (data.geom_xpos[g] - p) + R_tip_geom @ model.geom_aabb[g, :3]
+            at = R.T @ (data.geom_xpos[g] - T_tip[:3, 3]) + R_tip_geom @ model.geom_aabb[g, :3]
             half = np.abs(R_tip_geom) @ model.geom_aabb[g, 3:] + [margin, margin, min(margin, _UPRIGHT_M)]
             boxes.append(Box(f"gripper{g}", at, half))
     return tuple(boxes)
@@ -95,7 +103,7 @@ class SlideFingers:
         data.ctrl[self._grip] = opening
 
     def commanded(self, data: Any) -> float:
-        """Where they shall be."""
+        """The opening that they are commanded to."""
         return float(data.ctrl[self._grip])
 
     def put(self, data: Any, opening: float) -> None:

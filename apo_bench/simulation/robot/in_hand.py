@@ -1,6 +1,6 @@
-"""What is in the hand: kept there on its way, taken along at once, and how it moves between grasp and release.
+"""Move what is in the hand: keep it there on its way, take it along at once, weld it.
 
-What is carried freely stays where it is in the hand. A contact of MuJoCo asks for J a = -b J v, where J v is the speed
+What is carried freely stays where it is in the hand. A contact of MuJoCo solves J a = -b J v, where J v is the speed
 of one side past the other. The acceleration of one side past the other is J a + dJ/dt v, and dJ/dt v is not zero where
 contacts move along an arc. So the pads take a carried part along with an error of some |dJ/dt v| / b, 1 mm/s: it creeps
 by 0.1 to 1.1 mm until it is above its goal. With dJ/dt v taken off the right side, step by step, 0.77 mm became 0.03 at
@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import InHand
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.frames import body_frame, quaternion
-from apo_bench.simulation.scene import Scene, World, part_pose, place, touch_others
+from apo_bench.simulation.scene import Scene, World, part_pose, set_part_pose, touches_others
 
 SLIPS_M = 5e-5
 """What moves farther in the hand in a tick does not creep: it slips."""
@@ -34,12 +33,12 @@ class Carried(NamedTuple):
     """Where the first part is kept in the hand, (4, 4); None while it is not carried freely."""
 
 
-def steadied(world: World, data: Any, T_world_tip: Array, carried: Carried) -> Carried:
+def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -> Carried:
     """Put what is carried back where it was in the hand a tick ago, as one rigid body; speeds stay.
 
     Nothing is put back while any of it touches anything but the hand, and what slips in earnest is left to slip.
     """
-    if touch_others(world, data, carried.parts):
+    if touches_others(world, data, carried.parts):
         return carried._replace(T_tip_part=None)
     now = part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
@@ -49,7 +48,7 @@ def steadied(world: World, data: Any, T_world_tip: Array, carried: Carried) -> C
             for part in carried.parts:
                 v = world.dof[part]
                 velocity = np.array(data.qvel[v : v + 6])
-                place(world, data, part, shift @ part_pose(world, data, part))
+                set_part_pose(world, data, part, shift @ part_pose(world, data, part))
                 data.qvel[v : v + 6] = velocity
             return carried
     return carried._replace(T_tip_part=pose.inverse(T_world_tip) @ now)
@@ -83,7 +82,7 @@ def fast_forward(
 
 
 def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Array, Array, Array]) -> None:
-    """Move parts as one rigid body with a frame, (4, 4): where it is, where it shall be, and where `TINY_S` later."""
+    """Move parts as one rigid body with a frame, (4, 4): where it is, where it goes, and where `TINY_S` later."""
     before, after, later = frames
     way = after @ pose.inverse(before)
     # Velocity of the frame by differences; R(later) R(after)^T is 1 + hat(spin) TINY_S to first order, so the spin is
@@ -93,7 +92,7 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
     spin = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
     for part in held:
         T = way @ part_pose(world, data, part)
-        place(world, data, part, T)
+        set_part_pose(world, data, part, T)
         v = world.dof[part]
         # v = v_frame + spin x lever; MuJoCo has the spin of a free body in the frame of the body.
         data.qvel[v : v + 3] = speed + np.cross(spin, T[:3, 3] - after[:3, 3])
@@ -109,41 +108,3 @@ def weld(scene: Scene, data: Any, part: str, on: bool) -> None:
         T = pose.inverse(mount) @ body_frame(data, model.body(f"{part}/").id)
         model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *quaternion(T), 1)
     data.eq_active[weld] = int(on)
-
-
-class HoldWatch(NamedTuple):
-    """What was seen so far of one transfer, and of those before it; each look makes a new one."""
-
-    grasped: Array | None = None
-    """The part in the frame of the tip when the fingers had closed, (4, 4); None while nothing is held."""
-    carried: tuple[float, float] = (0.0, 0.0)
-    moved: tuple[float, float] | None = None
-    """By how much since then, [m] and [rad]; None of what was never held."""
-    finished: tuple[InHand, ...] = ()
-
-    def grasp(self, T: Array) -> "HoldWatch":
-        """The fingers have closed; once more where the grip is changed."""
-        return self._replace(grasped=T)
-
-    def carry(self, T: Array) -> "HoldWatch":
-        """The part is where its last motion begins."""
-        return self._replace(carried=self._since(T))
-
-    def release(self, T: Array) -> "HoldWatch":
-        """The fingers are about to open, or nothing goes on."""
-        here = self._since(T)
-        before = self.moved or (0.0, 0.0)
-        return self._replace(grasped=None, moved=(max(before[0], here[0]), max(before[1], here[1])))
-
-    def finish(self, operation: int) -> "HoldWatch":
-        """The transfer is over."""
-        if self.moved is None:
-            return HoldWatch(finished=self.finished)
-        return HoldWatch(finished=(*self.finished, InHand(operation, *self.carried, *self.moved)))
-
-    def _since(self, T: Array) -> tuple[float, float]:
-        """How far the point between the pads has moved along with the part, and how far the part has turned."""
-        if self.grasped is None:
-            return 0.0, 0.0
-        moved = T @ pose.inverse(self.grasped)
-        return float(np.linalg.norm(moved[:3, 3])), float(np.linalg.norm(pose.log(moved)[3:]))

@@ -1,8 +1,8 @@
-"""Which part of a motion is rich in contact: where the hand, or what it holds, is near anything else.
+"""Find the stretches of a motion on which the hand, or what it holds, is near anything else.
 
-Asked by the hands that demonstrate, and by the robot only at `--fidelity near-contact`. It looks at the state of the
-simulation, as the physics does; no command of the robot depends on it. Boxes that a
-separating axis keeps apart by less than `NEAR_HELD_M` are near, which is never too few.
+The hands that demonstrate use it, and the robot only with the fidelity `near-contact`. It reads the state of the
+simulation, as the physics does; no command of the robot depends on it. Boxes that a separating axis
+keeps apart by less than `NEAR_HELD_M` are near, which is never too few.
 """
 
 from collections.abc import Iterable, Sequence
@@ -28,7 +28,7 @@ _SHORTEST_S = 0.05
 """Less than this is not worth leaving out."""
 _STILL_M_S = 1e-3
 _STILL_RAD_S = 2e-2
-"""While anything that nobody holds moves faster, nothing is left out."""
+"""While a part that is not held moves faster, nothing is left out."""
 _UPRIGHT = 1e-6
 
 _Flags = NDArray[np.bool_]
@@ -92,8 +92,7 @@ def near_spans(
     if not _still(world, data, others):
         return [(0, n)]
     obstacles = [obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
-    far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(far))), n))
+    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
     near = _near(moving, obstacles, line, s[looks], near_m[len(held) > 1])
     return _spans(near, looks, n, run_up_s, float(scene.physics.timestep_s))
 

@@ -33,6 +33,11 @@ class Trajectory:
     progress: Callable[[Array], Array]
     """Time / seconds in [0, 1] -> part of the way in [0, 1]."""
 
+    @property
+    def length(self) -> float:
+        """How far the position goes, [m]."""
+        return distance(self.start, self.end)
+
     @cached_property
     def turn(self) -> Array:
         """The rotation vector from start to end, (3,), in the frame of the start, [rad]."""
@@ -48,23 +53,29 @@ class Trajectory:
         return T
 
 
-def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5) -> Trajectory:
+def distance(start: Array, end: Array) -> float:
+    """Between the positions of two poses, [m]."""
+    return float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+
+
+def smooth_trajectory(start: Array, end: Array, speed: float, turn_speed: float = 1.5) -> Trajectory:
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
-    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     turn = float(np.linalg.norm(_turn_between(start, end)))
-    return Trajectory(start, end, max(_SHORTEST_S, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
+    seconds = max(_SHORTEST_S, _PEAK * distance(start, end) / speed, _PEAK * turn / turn_speed)
+    return Trajectory(start, end, seconds, minimum_jerk)
 
 
-def steady(start: Array, end: Array, speed: float) -> Trajectory:
+def steady_trajectory(start: Array, end: Array, speed: float) -> Trajectory:
     """Constant speed [m/s] with a short ramp at both ends, for motions that a guard may stop."""
-    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    seconds = max(far / speed + _RAMP_S, 2.0 * _RAMP_S)
+    seconds = max(distance(start, end) / speed + _RAMP_S, 2.0 * _RAMP_S)
     return Trajectory(start, end, seconds, _Trapezoid(_RAMP_S / seconds))
 
 
-def paced(start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]) -> Trajectory:
+def paced_trajectory(
+    start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]
+) -> Trajectory:
     """As `steady`, at one speed [m/s] along some stretches, from and to so far from the start, [m], else at another."""
-    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    far = distance(start, end)
     x = np.linspace(0.0, far, max(2, round(far / _CELL_M)) + 1)
     limit = np.full(len(x), quick)
     for begin, stop in stretches:
@@ -169,7 +180,7 @@ def _halfway(start: Array, at: Array, turn: float) -> Array:
     return T
 
 
-def shifted(T: Array, along: Array, by: float) -> Array:
+def translate(T: Array, along: Array, by: float) -> Array:
     """The pose shifted in the world."""
     out = np.array(T)
     out[:3, 3] += by * np.asarray(along)

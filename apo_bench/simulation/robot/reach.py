@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from apo_bench.geometry import Array
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_around, waypoints_unwound
+from apo_bench.simulation.robot.paths import Trajectory, smooth_trajectory, waypoints_around, waypoints_unwound
 
 _KNOT_M = 0.03
 _KNOT_RAD = 0.15
@@ -24,7 +24,7 @@ _CREEP_RAD_S = 2e-3
 """Dry friction is full above some such."""
 _FAR_M = 0.3
 _FAR_RAD = 1.0
-"""The spacing of knots where only the joint angles at the end are asked for, and nothing is between them."""
+"""The spacing of knots where only the joint angles at the end are needed, and nothing is between them."""
 
 
 class Knots(NamedTuple):
@@ -42,7 +42,7 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
     Args:
         s: (k,), in ascending order, from 0 to 1.
         q: (joints,), at the first of the places, [rad].
-        known: From `within_speed`, of a line that begins at `q`; solved again only where other knots are needed.
+        known: From `limit_speed`, of a line that begins at `q`; solved again only where other knots are needed.
     """
     if len(s) == 1:
         return np.asarray(q)[None]
@@ -68,7 +68,7 @@ def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q
     return None
 
 
-def way_there(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Array) -> tuple[Array, ...]:
+def plan_waypoints(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Array) -> tuple[Array, ...]:
     """Where to go through in the air from T, where the joints are q, to another pose.
 
     Straight, unless only a way around where the base stands is in reach, which short arms have in their way. The usual
@@ -76,24 +76,24 @@ def way_there(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Array) 
     """
     rest = kinematics.forward(arm.home)
     straight = waypoints_unwound(rest, T, end)
-    if arm.hand is None or led_there(kinematics, T, straight, q) is not None:
+    if arm.hand is None or follow_waypoints(kinematics, T, straight, q) is not None:
         return straight
     around = waypoints_around(np.array(arm.base), rest, T, end)
-    return straight if led_there(kinematics, T, around, q) is None else around
+    return straight if follow_waypoints(kinematics, T, around, q) is None else around
 
 
-def led_there(kinematics: Kinematics, T: Array, way: Sequence[Array], q: Array) -> Array | None:
+def follow_waypoints(kinematics: Kinematics, T: Array, way: Sequence[Array], q: Array) -> Array | None:
     """Where the joints end that lead the tip along straight lines from T, where they are q; None out of reach."""
     for to in way:
-        path = along(kinematics, smooth(T, to, 1.0), np.array([0.0, 1.0]), q)
+        path = along(kinematics, smooth_trajectory(T, to, 1.0), np.array([0.0, 1.0]), q)
         if path is None:
             return None
         T, q = to, path[-1]
     return q
 
 
-def led(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
-    """What position servos are commanded so that the joints are on a path, (n, joints), at velocities, [rad/s].
+def feedforward_command(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
+    """The commands of position servos with which the joints are on a path, (n, joints), at velocities, [rad/s].
 
     Args:
         lead: (joints,), damping over gain, [s].
@@ -102,7 +102,7 @@ def led(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
     return np.asarray(path + (lead * velocity + stick * np.tanh(velocity / _CREEP_RAD_S)))
 
 
-def turned_by(kinematics: Kinematics, ends: Sequence[tuple[Array, Array]], q: Array, by: float) -> Array | None:
+def joint_gradients(kinematics: Kinematics, ends: Sequence[tuple[Array, Array]], q: Array, by: float) -> Array | None:
     """How the joints turn while the tip is moved in some ways, (ways, joints), [rad] per unit; None out of reach.
 
     By central differences of the inverse kinematics: as good as exact over some millimetres.
@@ -121,7 +121,7 @@ def turned_by(kinematics: Kinematics, ends: Sequence[tuple[Array, Array]], q: Ar
     return np.array(turns)
 
 
-def within_speed(
+def limit_speed(
     kinematics: Kinematics, line: Trajectory, q: Array, limit: Array | None
 ) -> tuple[Trajectory, Knots | None]:
     """The same line, slower where a joint would turn faster than it can; and the knots that were solved for that.
@@ -146,8 +146,7 @@ def within_speed(
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
     """How many steps of these lengths, [m] and [rad], a line takes."""
-    length = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    return max(length / far, float(np.linalg.norm(line.turn)) / turn)
+    return max(line.length / far, float(np.linalg.norm(line.turn)) / turn)
 
 
 def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:

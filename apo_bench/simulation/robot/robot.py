@@ -1,9 +1,9 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
 Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
-`nudge`, for motions of which each depends on what was felt in the one before it. The robot knows what it commanded, its
-own joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads
-or sets poses of parts is the simulation's own: `_look` and `slip` shift them in the hand, `in_hand` records that, and
+`servo_step`, for motions of which each depends on the force in the step before. The robot knows what it commanded,
+its joint and finger positions and the force on the part in its hand: no command depends on where a part is. The
+simulation alone reads or sets poses of parts: `_look` and `slip` shift them in the hand, `in_hand` records that, and
 `follow` and `fingers` leave out steps while nothing is near (fidelity `near-contact`). One class: these share steps.
 """
 
@@ -17,32 +17,39 @@ import numpy as np
 
 from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
+from apo_bench.simulation.hooks import TICK_S, Hooks, Phase, as_hooks
+from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
-from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
+from apo_bench.simulation.robot.in_hand import Carried, fast_forward, hold_steady, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
-from apo_bench.simulation.robot.paths import Trajectory, smooth
-from apo_bench.simulation.robot.reach import along, at_end, led, way_there, within_speed
+from apo_bench.simulation.robot.paths import Trajectory, distance, smooth_trajectory
+from apo_bench.simulation.robot.reach import along, at_end, feedforward_command, limit_speed, plan_waypoints
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WRIST_S, ForceSensors, Guard, WristSensor
-from apo_bench.simulation.scene import Scene, has_failed, initial_state, is_unstable, part_pose, timestep, unfelt
+from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
+from apo_bench.simulation.robot.wrist import WristSensor
+from apo_bench.simulation.scene import Scene, has_failed, initial_state, is_unstable, part_pose, sensors_off, timestep
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
 """Joints and fingers that move slower than this rest."""
 
 
-class Halt(Exception):
-    """The robot gives up; caught by `replay`, which makes an `Outcome` of it."""
+class ExecutionAborted(Exception):
+    """The robot aborts the execution; `replay` catches it and makes an `Outcome` of it.
+
+    Attributes:
+        stage: What the robot did: `pick`, `carry`, `attach` and so on.
+        code: What went wrong, a failure code.
+        part: Which part it is about, if not the one that is moved.
+        why: What is known of the cause.
+    """
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
         super().__init__(stage, code, part)
         self.stage = stage
         self.code = code
         self.part = part
-        """Which part it is about, if not the one that is moved."""
         self.why = ""
-        """What is known of the cause."""
 
 
 class Robot:
@@ -59,18 +66,18 @@ class Robot:
         self.scene = scene
         self.arm = scene.arm
         self.model = scene.work.model
-        self.hooks = hooks_of(watch)
+        self.hooks = as_hooks(watch)
         self.stage = "plan"
         self.macro = ""
         self.step: Step | None = None
-        self.hold_watch = HoldWatch()
+        self.slip_monitor = GraspSlipMonitor()
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
         self.wrist: WristSensor | None = None
         """Reads every step and stops guarded motions, while it is on (`by_wrist`)."""
         self._error = error
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
-        # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.
+        # What is near is looked for where the tip is estimated, so with joints that are off nothing is left out.
         self.fidelity = "full" if self._off.any() else fidelity
         self._carried: Carried | None = None
         model = self.model
@@ -100,24 +107,24 @@ class Robot:
 
     @contextmanager
     def watch_stability(self) -> Iterator[None]:
-        """Give up, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
+        """Abort, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
         try:
             yield
         except (mujoco.FatalError, ArithmeticError, ValueError) as error:
             if is_unstable(error, self.data):
-                raise Halt(self.stage, "unstable_simulation") from error
+                raise ExecutionAborted(self.stage, "unstable_simulation") from error
             raise
 
     def follow(self, line: Trajectory, guard: Guard | None = None) -> float:
         """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
 
         Raises:
-            Halt: The line leaves the arm's reach, or something went wrong on the way.
+            ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
         """
         if np.abs(line.start - line.end).max() < 1e-7:
             return 0.0
         kinematics = self.scene.kinematics
-        line, knots = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        line, knots = limit_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         done = 0
@@ -132,49 +139,35 @@ class Robot:
                 work = self.scene.work
                 fast_forward(work, self.data, kinematics.forward, joints, q - self.q, velocity[0], self.forces.held)
                 self._pass((begin - done) * self.step_s)
-            if self._run(led(path, velocity, self._lead, self._stick)[1:], guard) < end - begin:
+            if self._run(feedforward_command(path, velocity, self._lead, self._stick)[1:], guard) < end - begin:
                 # The measured joint positions become the command, which takes the pressure away.
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
                 self.stand(0.06)
-                return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
+                return distance(self.T, line.end)
             self.q = path[-1]
             done = end
         self.T = line.end
         return 0.0
 
-    def trace(self, line: Trajectory) -> Array:
-        """Follow a line through free air, and see where the tip really is at each step, (n, 4, 4).
-
-        Raises:
-            Halt: The line leaves the arm's reach.
-        """
-        line, knots = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
-        n = max(2, round(line.seconds / self.step_s))
-        path = self.reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
-        tips = []
-        for target in led(path, np.gradient(path, self.step_s, axis=0), self._lead, self._stick)[1:]:
-            self._tick(self._commands(target[None]))
-            tips.append(self.tip())
-        self.q = path[-1]
-        self.T = line.end
-        return np.array(tips)
-
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
-        for T in way_there(self.scene.kinematics, self.arm, self.T, end, self.q):
-            self.follow(smooth(self.T, T, speed, turn_speed))
+        for T in plan_waypoints(self.scene.kinematics, self.arm, self.T, end, self.q):
+            self.follow(smooth_trajectory(self.T, T, speed, turn_speed))
 
-    def nudge(self, q: Array, passed: int, velocity: Array | None = None) -> list[float]:
-        """One physics step towards joint angles, [rad], led by a velocity, [rad/s]; whenever a tick has passed, a look.
+    def servo_step(self, q: Array, passed: int = 1, velocity: Array | None = None) -> list[float]:
+        """Take one physics step towards joint angles, [rad], with a velocity, [rad/s], fed forward.
+
+        Args:
+            passed: How many steps have passed: after a tick the robot looks for trouble.
 
         Returns:
             The force on the part in the hand, (3,) world, [N].
         """
-        to = q if velocity is None else led(q, velocity, self._lead, self._stick)
+        to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
         self.data.ctrl[self._drives] = to + self._off
         mujoco.mj_step(self.model, self.data)
-        force = self.forces.feel(self.step_s)
+        force = self.forces.read(self.step_s)
         if passed % self._steps_of_tick == 0:
             self._look()
         return force
@@ -204,7 +197,7 @@ class Robot:
         opening = self.opening()
         start = min(max(fingers.commanded(self.data), opening - fingers.slack), opening + fingers.slack)
         ticks = max(1, round(abs(to - start) / self.arm.limits.fingers_m_s / TICK_S))
-        if self.fidelity == "contact" and not self.forces.held:
+        if self.fidelity == "near-contact" and not self.forces.held:
             # Nothing may be near the empty hand, neither as it is nor with its fingers where they go.
             moving = moving_with_tip(self.scene, self.data, self.tip(), max(to, opening), ())
             if clear(self.scene, self.data, moving, self.T):
@@ -219,7 +212,7 @@ class Robot:
         fingers.command(self.data, to)
 
     def _rests(self) -> bool:
-        """Whether the joints and the fingers rest, as far as they feel."""
+        """Whether the joints and the fingers rest, by their encoders."""
         turning = np.abs(self.data.qvel[self._dof])
         return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
 
@@ -237,19 +230,19 @@ class Robot:
 
     def memory(self) -> tuple[Any, ...]:
         """What the controller knows, apart from the physics; for `remember`."""
-        return self.q, self.T, self.stage, self.left_out_s, self.hold_watch, self.forces.memory()
+        return self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, self.forces.memory()
 
     def remember(self, memory: tuple[Any, ...]) -> None:
         """Go on from where a `memory` was made, once the physics are where they were then."""
-        self.q, self.T, self.stage, self.left_out_s, self.hold_watch, forces = memory
+        self.q, self.T, self.stage, self.left_out_s, self.slip_monitor, forces = memory
         self.forces.remember(forces)
 
     def in_hand(self) -> Array:
-        """Where the held part lies in the frame of the tip, (4, 4), for `HoldWatch`: nothing is decided by it."""
+        """The held part in the frame of the tip, (4, 4), for `GraspSlipMonitor`: nothing is decided by it."""
         return np.asarray(pose.inverse(self.tip()) @ part_pose(self.scene.work, self.data, self.forces.held[0]))
 
     def slip(self, operation: int) -> None:
-        """What is in the hand moves along the pads, if the robot's errors have it so; nothing else learns of it."""
+        """What is in the hand moves along the pads, if the robot's errors state it; nothing else knows of it."""
         held = self.forces.held
         if self._error is None or not held or not self._error.slips(operation):
             return
@@ -282,15 +275,15 @@ class Robot:
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _pass(self, seconds: float) -> None:
-        """Let time pass in which nothing is felt."""
+        """Let time pass in which no force acts."""
         self.data.time += seconds
         self.forces.wrist((0.0, 0.0, 0.0), min(seconds, WRIST_S))
         self.left_out_s += seconds
 
     def reached(self, q: Array | None) -> Array:
-        """Joint angles, if the arm can be there; else it gives up."""
+        """Joint angles, if the arm can be there; else the robot aborts."""
         if q is None:
-            raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
+            raise ExecutionAborted(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
 
     def _commands(self, targets: Array) -> Array:
@@ -314,8 +307,8 @@ class Robot:
     def _tick(self, commands: Array, guard: Guard | None = None) -> int:
         """One physics step for each command, (n, controls), between two looks.
 
-        What is held is felt at each step, and all of it while the sensor at the wrist is on. Otherwise nothing is asked
-        of an empty hand before the look, so sensors are computed in the last step only.
+        Forces on what is held are read at each step, and all forces while the sensor at the wrist is on. Sensors of an
+        empty hand are read at the look only, so they are computed in the last step only.
 
         Returns:
             After how many steps the guard stopped it; 0 if it did not.
@@ -323,7 +316,7 @@ class Robot:
         model = self.model
         data = self.data
         if self.wrist is None and not self.forces.held:
-            with unfelt(model):
+            with sensors_off(model):
                 for command in commands[:-1]:
                     data.ctrl[:] = command
                     mujoco.mj_step(model, data)
@@ -336,7 +329,7 @@ class Robot:
         for steps, command in enumerate(commands, start=1):
             data.ctrl[:] = command
             mujoco.mj_step(model, data)
-            x, y, z = self.forces.feel(step_s)
+            x, y, z = self.forces.read(step_s)
             if self.wrist is not None:
                 if self.wrist.take(step_s) and self.wrist.stops(guard):
                     return steps
@@ -347,12 +340,12 @@ class Robot:
     def _look(self) -> None:
         """Once a tick: stability, contact force on the held part, blows to other parts; then the hook."""
         if has_failed(self.data):
-            raise Halt(self.stage, "unstable_simulation")
+            raise ExecutionAborted(self.stage, "unstable_simulation")
         if self._carried is not None:
-            self._carried = steadied(self.scene.work, self.data, self.tip(), self._carried)
+            self._carried = hold_steady(self.scene.work, self.data, self.tip(), self._carried)
         if struck := self.forces.struck():
-            raise Halt(self.stage, "collision", struck)
+            raise ExecutionAborted(self.stage, "collision", struck)
         if self.hooks.after_tick is not None:
             macro = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)
-            self.hooks.after_tick(self.data, Doing(k, macro, math.hypot(*self.forces.wrist.force), undoes))
+            self.hooks.after_tick(self.data, Phase(k, macro, math.hypot(*self.forces.wrist.force), undoes))

@@ -1,6 +1,6 @@
-"""What is wrong with one robot during one trial: drawn before, and met only by the physics.
+"""The errors of one robot during one trial: drawn before it, and known only to the physics.
 
-Whoever plans, predicts or corrects knows the robot as it should be. Guards still act on the forces that are felt.
+Planners, predictors and correctors know the nominal robot. Guards still act on the measured forces.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ class RobotError:
     joints: Array
     """(joints,): by how much every joint is off what its encoder says, [rad]."""
     tool: Array
-    """(4, 4): where the tip comes to be, in the frame of where the robot believes it."""
+    """(4, 4): where the tip comes to be, in the frame of where the robot estimates it."""
     in_hand: Array
     """(n, 4, 4): how the part of each operation slips when it was taken, in the frame of the tip."""
 

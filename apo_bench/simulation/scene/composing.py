@@ -18,7 +18,8 @@ from apo_bench.scenario.parts import PartFile, read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.physics import Physics, set_contact, set_options
-from apo_bench.simulation.scene.geoms import OF_PARTS, Bits, dress, meetings
+from apo_bench.simulation.scene.contact_bits import OF_PARTS, Bits, meetings
+from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import WRIST_SENSORS
 
@@ -37,7 +38,6 @@ _NEAREST_M = 1e-10
 by less are at times found to be millimetres inside of each other, and leap apart."""
 _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
 """Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
-
 _WRIST_SITE = "wrist"
 _BEHIND_PICTURE = 3
 """Of MuJoCo's groups of geoms, 0 to 2 are shown."""
@@ -65,7 +65,7 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
 def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
     """Where the robot replays: a room with parts, the arm, sensors of force, and welds where it grasps by them.
 
-    Last come the sensors of the wrist, which stay off until they are asked for (`wrist_felt`).
+    Last come the sensors of the wrist, which stay off until a replay needs them (`wrist_sensors_on`).
 
     Args:
         first_link: The first body of the arm that moves.
@@ -161,7 +161,7 @@ def _movable_bodies(scenario: Scenario, spec: Any) -> Mapping[str, str]:
 
 
 def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[float], solimp: Iterable[float]) -> None:
-    """A weld that is off; where it holds is said when it is switched on."""
+    """Add a weld that is off; who switches it on sets where it holds."""
     weld = spec.add_equality(
         name=name,
         type=mujoco.mjtEq.mjEQ_WELD,
@@ -194,7 +194,7 @@ def _add_force_sensors(spec: Any, scenario: Scenario, arm: str) -> None:
     """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
 
     MuJoCo computes a sensor while one of the two bodies that it names is awake, and a body that cannot move never is.
-    So the arm is named by its first link that moves: by its base, a fixed part and the arm would feel nothing of each
+    So the arm is named by its first link that moves: by its base, a fixed part and the arm would have no sensor of each
     other while sleep is on.
     """
     for part in movable_parts(scenario):

@@ -1,99 +1,17 @@
 """Convex pieces as geoms of MuJoCo: boxes and cylinders as what they are, everything else as the mesh of its corners.
 
-MuJoCo moves and turns a mesh into the frame of its own inertia, and a geom's pose undoes that: corners that are given
-in the frame of the part are found there again, where the geom has no pose of its own.
-
-Which pieces can meet: a wall of a hole, and what is narrow enough to come in there.
-
-What is wider than a hole without its walls does not go in, and what is behind the walls holds it up: it need not be
-measured against them one by one. It may dig in with an edge, by the thickness of the walls deeper than it would. All
-that could go in, the arm, and walls that have nothing behind them meet as ever; walls do not meet walls.
+MuJoCo moves and turns a mesh into the frame of its own inertia, and the pose of the geom undoes that: corners in the
+frame of the part are found there again, where the geom has no pose.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from apo_bench.geometry import Array, Box, Hull, Piece, Solid, all_boxes
-from apo_bench.simulation.scene.walls import linings, simulated_pieces
-
-_ARM = 1
-"""The bit by which an arm meets everything."""
-OF_PARTS = (1 << 31) - 1 - _ARM
-"""All other bits: what parts meet by."""
-_PARTS = 1 << 30
-"""The bit by which parts meet each other; those below it are of holes, the narrowest has the highest."""
-_MOST = 16
-"""So many widths of holes are told apart; wider ones count as one."""
-_SURELY_M = 1e-4
-"""What is wider than the hole without its walls by this stays out."""
-
-
-class Bits(NamedTuple):
-    """Two geoms meet if the `contype` of one and the `conaffinity` of the other have a bit in common."""
-
-    contype: int
-    conaffinity: int
-
-
-def meetings(solids: Mapping[str, Solid], clearance_m: float) -> Mapping[str, Mapping[str, Bits]]:
-    """Part -> name of a piece as it is simulated -> its bits."""
-    lined = {part: linings(solid, clearance_m) for part, solid in solids.items()}
-    widths = sorted({_rounded(width) for walls in lined.values() for width in walls.values()})
-    return {
-        part: {
-            piece.name: _of_wall(lined[part][piece.name], widths) if piece.name in lined[part] else _of(piece, widths)
-            for pieces in simulated_pieces(solid, clearance_m).values()
-            for piece in pieces
-        }
-        for part, solid in solids.items()
-    }
-
-
-def is_lining(bits: Bits) -> bool:
-    """Whether these are the bits of a wall that not all meets."""
-    return not bits.contype & (_ARM | _PARTS)
-
-
-def _of_wall(width: float, widths: list[float]) -> Bits:
-    return Bits(_hole(widths.index(_rounded(width))), _ARM)
-
-
-def _of(piece: Piece, widths: list[float]) -> Bits:
-    if not widths:
-        return Bits(_ARM, _ARM)
-    narrow = widest_disc(piece)
-    met = _ARM | _PARTS
-    for i, width in enumerate(widths):
-        if narrow <= width + _SURELY_M:
-            met |= _hole(i)
-    return Bits(_PARTS, met)
-
-
-def _hole(i: int) -> int:
-    return _PARTS >> (1 + min(i, _MOST - 1))
-
-
-def _rounded(width: float) -> float:
-    return round(width, 6)
-
-
-def widest_disc(piece: Piece) -> float:
-    """The radius of a flat disc inside of a piece, [m]: the piece does not go through a narrower hole.
-
-    Of boxes and cylinders it is the widest, of other pieces the widest about their middle that is parallel to a side.
-    """
-    if isinstance(piece, Box):
-        return float(np.sort(piece.half)[1])
-    if piece.cylinder is not None:
-        return piece.cylinder.radius
-    # From the middle, along a plane of normal m, a side of normal n is at its distance / |n x m|.
-    n = piece.planes[:, :3]
-    far = piece.planes[:, 3] - n @ piece.corners.mean(axis=0)
-    return float((far / np.sqrt(np.maximum(1.0 - (n @ n.T) ** 2, 1e-12))).min(axis=1).max())
-
+from apo_bench.geometry import Array, Hull, Piece, Solid, all_boxes
+from apo_bench.simulation.scene.contact_bits import Bits, is_lining
 
 _ROLLING_CONDIM = 6
 """Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""
@@ -105,7 +23,7 @@ the pads', or the larger of the two."""
 _PADS_CONDIM = 4
 """Of contacts with pads: torsional friction, too."""
 _SURFACE = ("friction", "density", "rgba", "condim")
-"""What a geom has besides its shape."""
+"""What a geom has but its shape."""
 
 
 def add_pieces(spec: Any, body: Any, pieces: Iterable[Piece], surface: Mapping[str, Any], prefix: str = "") -> None:
@@ -121,7 +39,7 @@ def set_shape(spec: Any, geom: Any, piece: Piece) -> None:
         geom.pos = piece.center
         geom.size = piece.half
     elif piece.cylinder is None:
-        # corners are all that is said of a mesh, so its inertia is that of their hull
+        # corners are all that is known of a mesh, so its inertia is that of their hull
         convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         spec.add_mesh(name=geom.name, uservert=piece.corners.ravel(), inertia=convex)
         geom.type = mujoco.mjtGeom.mjGEOM_MESH

@@ -12,7 +12,7 @@ PARALLEL = 1e-7
 _SAME_VOLUME = 1e-6
 
 
-def within(hull: Hull, cut: Array) -> Hull:
+def clip_hull(hull: Hull, cut: Array) -> Hull:
     """What of a piece is on the inner side of a plane (n, d), n . x <= d, that goes through it."""
     # The corners below the plane, and where the lines from those to the corners above it cross it; the hull of all that
     # is the piece that was cut off, since lines through its inside end inside it.
@@ -26,7 +26,7 @@ def within(hull: Hull, cut: Array) -> Hull:
     return _hull_of(hull.name, np.concatenate([low, crossing.reshape(-1, 3)]))
 
 
-def around(a: Hull, b: Hull) -> Hull:
+def enclose(a: Hull, b: Hull) -> Hull:
     """The piece around two pieces, with the name of the first."""
     return _hull_of(a.name, np.concatenate([a.corners, b.corners]))
 
@@ -39,7 +39,7 @@ def volume(hull: Hull) -> float:
     return float(ConvexHull(hull.corners).volume)
 
 
-def joined(pieces: Iterable[Hull]) -> list[Hull]:
+def join_neighbours(pieces: Iterable[Hull]) -> list[Hull]:
     """Neighbours as one piece where they make a convex one; only what comes one after the other is tried."""
     found: list[Hull] = []
     for piece in pieces:
@@ -51,7 +51,7 @@ def joined(pieces: Iterable[Hull]) -> list[Hull]:
     return found
 
 
-def joined_across(pieces: Iterable[Hull]) -> list[Hull]:
+def join_convex(pieces: Iterable[Hull]) -> list[Hull]:
     """Any two as one piece where they make a convex one."""
     left = list(pieces)
     done: list[Hull] = []
@@ -78,16 +78,16 @@ def has_side(hull: Hull, plane: Array) -> bool:
     return bool((along & (np.abs(hull.planes[:, 3] - plane[3]) < ON_M)).any())
 
 
-def stood_back(hull: Hull, flats: Iterable[Array], by_m: float) -> Hull:
+def set_back(hull: Hull, flats: Iterable[Array], by_m: float) -> Hull:
     """A piece whose sides in these planes have moved inwards."""
     for plane in flats:
         if has_side(hull, plane):
-            hull = within(hull, plane - [0.0, 0.0, 0.0, by_m])
+            hull = clip_hull(hull, plane - [0.0, 0.0, 0.0, by_m])
     return hull
 
 
 def _as_one(a: Hull, b: Hull) -> Hull | None:
-    both = around(a, b)
+    both = enclose(a, b)
     whole = volume(both)
     return both if abs(whole - volume(a) - volume(b)) < _SAME_VOLUME * whole else None
 

@@ -126,7 +126,7 @@ def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: 
     mujoco.mjv_initGeom(geom, kind, _NOWHERE, _NOWHERE, _UPRIGHT, np.array([*color, 1.0], dtype=np.float32))
     mujoco.mjv_connector(geom, kind, width_m, a, b)
     if kind == mujoco.mjtGeom.mjGEOM_ARROW:
-        geom.size[2] *= 2.0  # drawn half as long as asked
+        geom.size[2] *= 2.0  # MuJoCo draws it half as long
     geom.emission = 0.35
     geom.specular = 0.1
     scene.ngeom += 1

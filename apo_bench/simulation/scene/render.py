@@ -1,4 +1,4 @@
-"""Pictures: of a state, of what is believed, and films of a replay. Nothing here is needed to simulate."""
+"""Draw pictures and films of a scene. Nothing here is needed to simulate."""
 
 import weakref
 from collections.abc import Callable, Iterable
@@ -17,7 +17,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, initial_state, place
+from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
 
 _Image = NDArray[np.uint8]
 SceneCamera: TypeAlias = str | mujoco.MjvCamera
@@ -40,7 +40,7 @@ def picture(
         camera: `overview`, `close`, `top`, or a `camera_view`.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
-    return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
+    return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
 
 
 def picture_with_arm(
@@ -58,7 +58,7 @@ def picture_with_arm(
         state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
-    return _drawn(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)
+    return _draw(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)
 
 
 def data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
@@ -161,7 +161,7 @@ class Film:
 
 
 def check_film(path: Path) -> None:
-    """Refuse a film that cannot be written; a GIF needs nothing that does not come along.
+    """Refuse a film that cannot be written; a GIF needs no further package.
 
     Raises:
         InputError: An ending other than .mp4 and .gif, or an MP4 without the package imageio-ffmpeg.
@@ -225,7 +225,7 @@ class ReplayWindow:
             self._window = None
 
 
-def _drawn(
+def _draw(
     world: World, data: Any, width: int, height: int, camera: SceneCamera, more: Callable[[Any], None] | None = None
 ) -> _Image:
     _check_camera(world, camera)
@@ -245,7 +245,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
     data = initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
-        place(world, data, part, poses.get(part, scene.scenario.start[part]))
+        set_part_pose(world, data, part, poses.get(part, scene.scenario.start[part]))
     data.mocap_pos[:, 2] = -1.0
     mujoco.mj_forward(world.model, data)
     return data

@@ -20,7 +20,7 @@ from apo_bench.geometry import Array, Solid, physical_pieces, pose
 from apo_bench.records import sentence
 from apo_bench.simulation.physics import Physics, physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import add_pieces, set_mass
-from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
+from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, set_part_pose, world
 
 LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned."""
@@ -44,7 +44,7 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
     """Where the parts come to rest, (n, 4, 4), world frame, [m].
 
     Returns:
-        Bare goals, to be measured by whoever asked; a `Correction` with the status `not_seen` and unknown gaps where an
+        Bare goals, to be measured by the caller; a `Correction` with the status `not_seen` and unknown gaps where an
         operation was not seen; what was seen, from the operation on at which the simulation became unstable.
     """
     if not observation.observed.all():
@@ -71,7 +71,7 @@ def _put(scene: World, data: mujoco.MjData, moves: tuple[str, ...], T: Array) ->
     """The main part at T, at rest, and what it carries along with it."""
     before = pose.inverse(part_pose(scene, data, moves[0]))
     for part in moves:
-        place(scene, data, part, T @ before @ part_pose(scene, data, part))
+        set_part_pose(scene, data, part, T @ before @ part_pose(scene, data, part))
 
 
 def _rest(scene: World, data: mujoco.MjData) -> None:

@@ -17,13 +17,13 @@ from apo_bench.geometry import SAGITTA_M, Array, Hull, Piece, RoundFace, Solid, 
 from apo_bench.simulation.scene.hulls import (
     ON_M,
     PARALLEL,
-    around,
+    clip_hull,
+    enclose,
     has_side,
-    joined,
-    joined_across,
-    stood_back,
+    join_convex,
+    join_neighbours,
+    set_back,
     volume,
-    within,
 )
 
 COARSE_M = 2.5e-5
@@ -79,16 +79,16 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
         lining = [wall for wall in group if _reaches_beyond(wall)]
         walls |= {wall.hull.name: None if _reaches_beyond(wall) else wall.hull for wall in group}
         walls |= {hull.name: hull for hull in _coarser(lining, clearance_m)}
-        behind += joined(within(wall.hull, -wall.cut) for wall in lining)
-    behind = joined_across(behind)
+        behind += join_neighbours(clip_hull(wall.hull, -wall.cut) for wall in lining)
+    behind = join_convex(behind)
     others = [p for p in pieces if isinstance(p, Hull) and p.cylinder is None and p.name not in walls]
     flats = [plane for plane in _flats(solid, clearance_m) if any(has_side(hull, plane) for hull in behind)]
     carried = [plane for plane in flats if any(has_side(hull, plane) for hull in others)]
     cut: dict[str, tuple[Piece, ...]] = {piece.name: (piece,) for piece in pieces}
     for name, wall in walls.items():
-        cut[name] = () if wall is None else (stood_back(wall, flats, SAGITTA_M),)
+        cut[name] = () if wall is None else (set_back(wall, flats, SAGITTA_M),)
     for hull in behind:
-        back = stood_back(Hull(f"{hull.name}_behind", hull.corners), carried, SAGITTA_M)
+        back = set_back(Hull(f"{hull.name}_behind", hull.corners), carried, SAGITTA_M)
         cut[hull.name] += (back,) if volume(back) > _SMALLEST_M3 else ()
     return cut
 
@@ -148,7 +148,7 @@ def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
     left = list(lining)
     while left:
         wall = left.pop(0)
-        alone = within(wall.hull, wall.cut)
+        alone = clip_hull(wall.hull, wall.cut)
         both = _as_one(wall, left[0], alone, clearance_m) if left else None
         if both is not None:
             left.pop(0)
@@ -160,9 +160,9 @@ def _as_one(a: _Wall, b: _Wall, first: Hull, clearance_m: float) -> Hull | None:
     cos = float(a.outwards @ b.outwards)
     if widest * (1.0 / max(cos, 0.1) - 1.0) > COARSE_M:
         return None
-    second = within(b.hull, b.cut)
+    second = clip_hull(b.hull, b.cut)
     middle = (a.outwards + b.outwards) / np.linalg.norm(a.outwards + b.outwards)
-    both = within(around(first, second), _tangents(a.face, middle[None], clearance_m)[0])
+    both = clip_hull(enclose(first, second), _tangents(a.face, middle[None], clearance_m)[0])
     apart = volume(first) + volume(second)
     return both if (1.0 - _LOST) * apart < volume(both) < apart else None
 

@@ -56,7 +56,7 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
     )
 
 
-def place(world: World, data: Any, part: str, T: Array) -> None:
+def set_part_pose(world: World, data: Any, part: str, T: Array) -> None:
     """Put a movable part somewhere, at rest."""
     a = world.qpos[part]
     v = world.dof[part]
@@ -73,7 +73,7 @@ def initial_state(world: World, start: Poses) -> Any:
         world.model.body_quat[body] = quaternion(start[part])
     data = mujoco.MjData(world.model)
     for part in world.free:
-        place(world, data, part, start[part])
+        set_part_pose(world, data, part, start[part])
     mujoco.mj_forward(world.model, data)
     return data
 
@@ -94,25 +94,25 @@ def is_unstable(error: Exception, data: Any) -> bool:
     return isinstance(error, mujoco.FatalError) or has_failed(data)
 
 
-def sleeping(world: World, allowed: bool) -> AbstractContextManager[None]:
-    """Whether parts that rest and that nothing moves against are left as they are, for a while."""
+def allow_sleep(world: World, allowed: bool) -> AbstractContextManager[None]:
+    """Let parts sleep, or not, for a while: those that rest and that nothing moves against."""
     flags = int(world.model.opt.enableflags)
     return _with_option(world.model, "enableflags", flags | SLEEP if allowed else flags & ~SLEEP)
 
 
 def timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
-    """Steps of another length, for a while."""
+    """Take steps of another length for a while."""
     return _with_option(model, "timestep", seconds)
 
 
-def unfelt(model: Any) -> AbstractContextManager[None]:
-    """Steps after which no sensor is asked: they need not be computed for a while."""
+def sensors_off(model: Any) -> AbstractContextManager[None]:
+    """Switch all sensors off for a while."""
     return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
 
 
 @contextmanager
-def wrist_felt(model: Any) -> Iterator[None]:
-    """Steps after which the sensors of the wrist are asked; else MuJoCo leaves them, and what only they need, out."""
+def wrist_sensors_on(model: Any) -> Iterator[None]:
+    """Compute the sensors of the wrist for a while, and what only they need."""
     sensors = [model.sensor(name).id for name in WRIST_SENSORS]
     before = model.sensor_needstage[sensors]
     model.sensor_needstage[sensors] = _WHEN_FELT
@@ -122,14 +122,14 @@ def wrist_felt(model: Any) -> Iterator[None]:
         model.sensor_needstage[sensors] = before
 
 
-def leave_wrist_unfelt(model: Any) -> None:
-    """From now on the sensors of the wrist are computed in `wrist_felt` only: they make a step a twentieth longer."""
+def disable_wrist_sensors(model: Any) -> None:
+    """Compute the sensors of the wrist in `wrist_sensors_on` only: they make a step a twentieth longer."""
     model.sensor_needstage[[model.sensor(name).id for name in WRIST_SENSORS]] = _NEVER
 
 
 @contextmanager
 def _with_option(model: Any, name: str, value: float) -> Iterator[None]:
-    """A model with another value of one of its options, for a while."""
+    """Give a model another value of one of its options for a while."""
     before = getattr(model.opt, name)
     setattr(model.opt, name, value)
     try:
@@ -138,15 +138,15 @@ def _with_option(model: Any, name: str, value: float) -> Iterator[None]:
         setattr(model.opt, name, before)
 
 
-def awaken(world: World, data: Any) -> None:
+def wake(world: World, data: Any) -> None:
     """Bring all that follows from the positions up to date, contacts of parts that were left alone too."""
-    with sleeping(world, False):
+    with allow_sleep(world, False):
         mujoco.mj_fwdPosition(world.model, data)
 
 
 def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     """What the judge may see of the present state."""
-    awaken(world, data)
+    wake(world, data)
     poses = {part: part_pose(world, data, part) for part in world.free}
     poses.update({part: start[part] for part in world.fixed})
     a, b = _contact_parts(world, data)
@@ -162,7 +162,7 @@ def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     )
 
 
-def touch_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
+def touches_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
     """Whether any of these movable parts touches another part; that they touch each other, or the arm, is not meant."""
     ours = np.array([world.free.index(part) for part in parts])
     a, b = _contact_parts(world, data)

@@ -1,4 +1,4 @@
-"""The arm between two actions: the tip is moved as asked, gives way to what it feels, and stops where it struck.
+"""The arm between two actions: the tip moves by the action, gives way to force, and stops where it struck.
 
 The robot knows what it commands, its encoders, its opening, the force on the part in its hand and the wrench at its
 wrist; nothing here reads where a part is.
@@ -20,12 +20,12 @@ from apo_bench.simulation.execution import (
     end_of_attach,
     pace,
     release,
-    take_up,
-    until_rest,
+    restore_state,
+    wait_for_rest,
 )
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot import LowPass, Robot, shifted
-from apo_bench.simulation.scene import Scene, part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.robot import LowPass, Robot, translate
+from apo_bench.simulation.scene import Scene, allow_sleep, part_pose, snapshot, wrist_sensors_on
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -47,21 +47,21 @@ _STRUCK = 0.03
 """Faster than this, [m/s], it stops by the force of a single step; else by the average."""
 _ACROSS_M = 0.015
 _TURN_RAD = math.radians(10.0)
-"""How far the tip is led off the line of the approach."""
+"""How far actions move the tip off the line of the approach."""
 _BACK_M = 0.01
 _BEYOND_M = 0.003
-"""How far behind its start, and beyond the end of the line, the tip is led along it."""
+"""How far behind its start, and beyond the end of the line, actions move the tip along it."""
 _ARRIVED_M = 0.0002
 _PUSHED = 4
 _NEAR_M = 0.002
 """The approach has arrived at its end, or where it was pushed back at so many actions running and is this near."""
 
 
-class Feel(NamedTuple):
-    """What the robot knows after an action, in the frame of the way in; the third axis leads in."""
+class TipReading(NamedTuple):
+    """What the robot knows after an action, in the frame of the insertion axis, its third axis."""
 
     tip: Array
-    """(6,), measured less where the line ends, [m, rad]: of the believed front of the part, and its turn."""
+    """(6,), measured less where the line ends, [m, rad]: of the estimated front of the part, and its turn."""
     lag: Array
     """(6,), commanded less measured, [m, rad]."""
     opening: float
@@ -85,15 +85,14 @@ class TipControl:
         self.nominal = nominal
         self.arrived = False
         """Whether the approach is over and would let go."""
-        self.robot = robot = Robot(scene, start.parts, Hooks(), "contact")
+        self.robot = robot = Robot(scene, start.parts, Hooks(), "near-contact")
         robot.compensate(start.off)
-        take_up(start.saved, robot)
+        restore_state(start.saved, robot)
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
         self._end = end_of_attach(t, start.grip, start.second)
-        front = np.zeros(3) if t.front is None else t.front
-        self._front = pose.apply(pose.inverse(start.grip.T_part_tip), front[None])[0]
+        self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]
         self._R = frame_of_way(t.into.way, self._end)
         self._pace = pace(t, start.second)
         self._guard = t.insert_n if t.into.level else t.place_n
@@ -110,41 +109,41 @@ class TipControl:
         self.begins = -float(self._at[2])
         """How far before the end of the line it begins, [m]."""
         with self._stepping():
-            self.feel = self._feel()
+            self.reading = self._read()
 
     def act(self, shift: Array, turn: Array) -> None:
-        """One period: move the tip as asked, and go on with the approach.
+        """One period: move the tip by the action, and go on with the approach.
 
         Args:
             shift: (3,), of the front of the part in the frame of the way in, [m].
             turn: (3,), a rotation vector about the front in that frame, [rad].
 
         Raises:
-            Halt: Something was struck, or fell out of the hand.
+            ExecutionAborted: Something was struck, or fell out of the hand.
         """
         with self._stepping():
             self._move(shift, turn)
             check_hold(self.robot, self.start.grip)
-            self.feel = self._feel()
+            self.reading = self._read()
 
     def let_go(self) -> Snapshot:
         """Open the fingers, do what the operation still has after an approach that arrived, and wait until parts rest.
 
         Raises:
-            Halt: Something went wrong; what was reached then is never judged.
+            ExecutionAborted: Something went wrong; what was reached then is never judged.
         """
         robot = self.robot
         t = self.start.transfer
         work = robot.scene.work
-        with sleeping(work, robot.scene.grasp == "friction"), robot.watch_stability():
+        with allow_sleep(work, robot.scene.grasp == "friction"), robot.watch_stability():
             robot.stand()
             if self.arrived:
-                at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
+                at_end = translate(robot.T, t.into.way, -float(self._off(robot.T)[2]))
                 after_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
             else:
                 release(robot, t, self.start.grip)
                 depart(robot, t)
-            until_rest(robot)
+            wait_for_rest(robot)
             return snapshot(work, robot.data, self.start.parts)
 
     def sigmas(self, covariance: Array) -> Array:
@@ -155,20 +154,18 @@ class TipControl:
         """
         t = self.start.transfer
         R = self._R.T @ t.T_world_goal[:3, :3]
-        front = np.zeros(3) if t.front is None else t.front
         # A twist (v, w) of the part shifts its front by v + w x front.
-        J = np.block([[R, -R @ pose.hat(front)], [np.zeros((3, 3)), R]])
+        J = np.block([[R, -R @ pose.hat(t.foremost)], [np.zeros((3, 3)), R]])
         return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
 
     def off(self, goals: Sequence[Array]) -> Array:
         """By how much the front of the part, and its turn, are off the lines to such poses of it, (6,), [m, rad].
 
-        The mean, in the frame of the way in; the third number is less than 0 before the end. For whoever watches, as
-        `poses`.
+        The mean, in the frame of the way in; the third number is less than 0 before the end. For observers, as `poses`.
         """
         t = self.start.transfer
         T = part_pose(self.robot.scene.work, self.robot.data, t.part)
-        front = np.zeros((1, 3)) if t.front is None else t.front[None]
+        front = t.foremost[None]
         found = []
         for goal in goals:
             way = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.way
@@ -179,7 +176,7 @@ class TipControl:
         return np.asarray(np.mean(found, axis=0))
 
     def poses(self) -> Poses:
-        """Where all parts are, (4, 4) each, world: for whoever watches, nothing is decided by it."""
+        """Where all parts are, (4, 4) each, world: for observers; nothing is decided by it."""
         work = self.robot.scene.work
         return {**self.start.parts, **{part: part_pose(work, self.robot.data, part) for part in work.free}}
 
@@ -192,8 +189,8 @@ class TipControl:
     def _stepping(self) -> Iterator[None]:
         robot = self.robot
         work = robot.scene.work
-        asleep = sleeping(work, robot.scene.grasp == "friction")
-        with asleep, wrist_felt(work.model), robot.watch_stability():
+        asleep = allow_sleep(work, robot.scene.grasp == "friction")
+        with asleep, wrist_sensors_on(work.model), robot.watch_stability():
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:
@@ -239,7 +236,7 @@ class TipControl:
             leads = turning + shifting @ led
             q = q + dt * (leads + shifting @ yields)
             self._passed += 1
-            self._force = robot.nudge(q, self._passed, leads)
+            self._force = robot.servo_step(q, self._passed, leads)
             self._wrist.take(dt)
         self._at = from_there + moved @ self._R
         robot.q = q
@@ -278,11 +275,11 @@ class TipControl:
         turn = pose.log(pose.rigid(T[:3, :3] @ self._end[:3, :3].T, np.zeros(3)))[3:]
         return np.concatenate([shift @ self._R, turn @ self._R])
 
-    def _feel(self) -> Feel:
+    def _read(self) -> TipReading:
         robot = self.robot
         tip = self._off(robot.scene.kinematics.forward(robot.encoders()))
         wrench = self._wrist.wrench_there().reshape(2, 3) @ self._R
-        return Feel(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
+        return TipReading(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
 
 
 def frame_of_way(way: Array, T_tip: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from apo_bench.assembly import ArcResiduals, Graph, Node, spelled
+from apo_bench.assembly import ArcResiduals, Graph, Node, spell
 from apo_bench.io import columns
 
 _GRAPH = "apo-bench/graph/1"
@@ -70,4 +70,4 @@ def _node_form(node: Node) -> dict[str, Any]:
 
 
 def _odl(node: Node) -> str:
-    return "T0" if node.placed is None else spelled(node.odl)
+    return "T0" if node.placed is None else spell(node.odl)

@@ -12,7 +12,7 @@ from apo_bench import InputError
 from apo_bench.benchmark.analysis import calibrations
 from apo_bench.benchmark.report.tables.methods import calibration_table
 from apo_bench.records import RECORD_FIELDS
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from tests.benchmark.analysis.test_rates import row, write
 
 
@@ -64,6 +64,6 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
     folder = write(tmp_path / "new", [row()])
-    assert read_rows(folder) == [dict.fromkeys(RECORD_FIELDS) | row()]
+    assert read_records(folder) == [dict.fromkeys(RECORD_FIELDS) | row()]
     with pytest.raises(InputError, match="a row of schema 'apo-bench/row/8' was given"):
-        read_rows(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))
+        read_records(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))

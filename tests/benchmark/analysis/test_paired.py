@@ -137,7 +137,7 @@ def test_pairs_add_up_in_any_order(results: list[tuple[bool, bool]], order: Any)
 def rows() -> list[dict[str, Any]]:
     """Ten seeds: the method right at 8, the paper at 6 of them and at one of its own, `none` at none."""
     right = {"contact": set(range(8)), "paper": {0, 1, 2, 3, 4, 5, 9}, "uncorrected": set()}
-    errors = {"contact": 1.0, "paper": 1.5, "none": 2.0}
+    errors = {"contact": 1.0, "paper": 1.5, "uncorrected": 2.0}
     noise = np.random.default_rng(3).normal(0, 0.1, (10, 3))
     return [
         row(m, seed, seed in right[m], planned_error_fixed_mm=0.1, planned_error_free_mm=errors[m] + noise[seed, i])
@@ -190,7 +190,7 @@ def test_none_is_the_reference_whatever_relations_were_told() -> None:
         ("given", "contact", "paper", -1.0),
         ("given", "contact", "uncorrected", 0.0),
         ("given", "paper", "uncorrected", 1.0),
-        ("false", "contact", "paper", 0.0),
+        ("false-positive", "contact", "paper", 0.0),
         ("false", "contact", "uncorrected", 1.0),
         ("false", "paper", "uncorrected", 1.0),
     ]

@@ -44,7 +44,7 @@ def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True,
         "scenario": "stick_in_tower",
         "clearance_mm": 0.25,
         "human_error_scale": 0.0 if method == "oracle" else 1.0,
-        "noise_level": 0.0 if method == "oracle" else 1.0,
+        "noise_mm": 0.0 if method == "oracle" else 1.0,
         "noise_deg": 0.0 if method == "oracle" else 1.0,
         "noise": "isotropic",
         "contact_source": "given",
@@ -221,7 +221,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
     assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
-    (figure,) = [path for path in made.figures if path.name == "success_over_level.png"]
+    (figure,) = [path for path in made.figures if path.name == "success_over_noise_level.png"]
     assert figure.read_bytes().startswith(b"\x89PNG")
     page = pages.lines(made.page)
     assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
@@ -236,7 +236,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
 
 def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
     """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
-    levels = ({"noise_level": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
+    levels = ({"noise_mm": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
     rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("uncorrected", "paper")]
     rows += [row("paper", clearance_mm=c, contact_source="false-negative") for c in (0.25, 1.0)]
     cells = tally(rows)
@@ -283,7 +283,7 @@ def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
     assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
     methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
     report(write(tmp_path / "run", [row(method) for method in dict.fromkeys(methods)]))
-    drawn = (tmp_path / "run" / "figures" / "success_over_level.svg").read_text(encoding="utf-8")
+    drawn = (tmp_path / "run" / "figures" / "success_over_noise_level.svg").read_text(encoding="utf-8")
     assert all(f">{method}</text>" in drawn for method in methods)
 
 

@@ -36,7 +36,7 @@ def test_it_holds_every_part() -> None:
         ("uncorrected", "paper"), ("paper", "uncorrected"), ("contact", "uncorrected"), ("contact", "paper")
     }  # fmt: skip
     assert [h.place.method for h in found.half_levels] == ["uncorrected", "contact", "paper"]
-    levels = [h.noise_level or np.nan for h in found.half_levels]
+    levels = [h.noise_mm or np.nan for h in found.half_levels]
     assert levels == pytest.approx([0.2, 3.0, 1.5], rel=0.6) or found.half_levels[0].beyond == "below"
 
 

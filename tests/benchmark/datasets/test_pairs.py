@@ -19,7 +19,7 @@ from apo_bench.perception.observation.models.symmetric import AnyTurn
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.scenario import human_error_covariance, scenario_names, spread_error
-from apo_bench.scenario.layouts import draw_layouts
+from apo_bench.scenario.layout import draw_layouts
 from apo_bench.trial.stages import stream
 
 SHARED = {"bias-view", "correlated", "swaps", "displaced-view"}

@@ -156,7 +156,7 @@ def test_no_sentence_contradicts_the_counts(rows: list[dict[str, Any]]) -> None:
     results: dict[str, dict[tuple[Any, ...], bool]] = {}
     for r in rows:
         if r["success"] is not None:
-            results.setdefault(r["method"], {})[r["noise_level"], r["seed"]] = r["success"]
+            results.setdefault(r["method"], {})[r["noise_mm"], r["seed"]] = r["success"]
     words = answer(rows, ())
     if not any(any(own.values()) for own in results.values()):
         assert words.startswith("No method succeeds in any trial" if results else "No trial counts")

@@ -140,9 +140,7 @@ def test_the_command_writes_a_page_and_exits_with_0(
     assert "Verdicts agree in 46 of 48 (95.83 %): 1 right in the first alone, 1 in the second alone." in said
     assert "versions: mujoco, rows: fidelity" in said
     line, _ = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
-    assert (
-        line["command of the first"] == "apo-bench replay stick_in_tower --clearance-mm 0.25 --method contact --seed 0"
-    )
+    assert line["command of the first"] == "apo-bench run stick_in_tower --clearance-mm 0.25 --method contact --seed 0"
     assert line["command of the second"].endswith("--method contact --fidelity near-contact --seed 0")
     page = pages.lines(out / "compare.html")
     assert "| stick_in_tower | 39 | 37 (94.87 %) | 83.11 to 98.58 % |" in page

@@ -17,8 +17,9 @@ from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells
 from apo_bench.io import clean
-from apo_bench.records.run.replay_command import own_code, replay_command
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.own_code import own_code
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
@@ -99,7 +100,7 @@ def dangerous(seed: int, evil: str) -> dict[str, Any]:
 @pytest.mark.parametrize("evil", DANGEROUS)
 def test_commands_are_quoted(evil: str) -> None:
     said = shlex.split(replay_command(dangerous(3, evil)))
-    assert said[:2] == ["apo-bench", "replay"]
+    assert said[:2] == ["apo-bench", "run"]
     assert said[2] == (f"./{evil}" if evil.startswith("-") else evil)
     for option, value in (("--noise", evil), ("--arm", evil), ("--contact-source", f"x:{evil}"), ("--method", evil)):
         assert said[said.index(option) + 1] == value
@@ -137,18 +138,18 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
     from apo_bench.cli.trial_text import print_row
-    from apo_bench.trial.outcome_columns import result
+    from apo_bench.trial.endings import end_record
 
-    end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
+    end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
     print_row(row("contact", 0, False, pose_source="noise-model") | end)
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
-    assert [one["sentence"] for one in read_rows(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
+    assert [one["sentence"] for one in read_records(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
 @pytest.mark.parametrize(
-    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
+    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_noise_level.svg"]
 )
 def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
     folder = write(tmp_path / "run", [row("contact")])

@@ -48,7 +48,7 @@ def numbers(seed: int, method: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = write(tmp_path_factory.mktemp("page") / "run", rows())
-    keys = ("scenario", "method", "seed", "noise_level")
+    keys = ("scenario", "method", "seed", "noise_mm")
     lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
     text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
     (folder / "timing.jsonl").write_text(text, encoding="utf-8")
@@ -118,14 +118,14 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         first = lines.nth(3).inner_text()
         assert first.startswith("3")
         assert "2.03" in first
-        want = "apo-bench replay stick_in_tower --noise-level 2 --clearance-mm 0.25 --method paper --seed 3"
+        want = "apo-bench run stick_in_tower --noise-level 2 --clearance-mm 0.25 --method paper --seed 3"
         assert lines.nth(3).locator("code").inner_text() == want
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         lines.nth(3).locator("button.copy").click()
         page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
         assert page.evaluate("navigator.clipboard.readText()") == want
         page.locator(".trials input").check()
-        failed = [r for r in rows() if (r["method"], r["noise_level"], r["success"]) == ("paper", 2.0, False)]
+        failed = [r for r in rows() if (r["method"], r["noise_mm"], r["success"]) == ("paper", 2.0, False)]
         assert lines.count() == len(failed)
         page.keyboard.press("Escape")
         assert button.get_attribute("aria-expanded") == "false"
@@ -202,7 +202,13 @@ def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
 def test_figures_are_files_that_stand_alone(made: Report) -> None:
     drawn = [path for path in made.figures if path.suffix == ".svg"]
     names = {path.stem for path in drawn}
-    assert {"success_over_level", "difference_to_paper", "failure_stages", "gap_before_and_after", "timing"} <= names
+    assert {
+        "success_over_noise_level",
+        "difference_to_paper",
+        "failure_stages",
+        "gap_before_and_after",
+        "timing",
+    } <= names
     for path in drawn:
         root = ElementTree.parse(path).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
@@ -294,7 +300,7 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))
-    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_level"] is not None for r in trials)
+    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_mm"] is not None for r in trials)
 
 
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_a_page_without_graphics_says_so(
 
 def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     usual = {"pose_source": "noise-model", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
-    said = "apo-bench replay stick_in_tower --clearance-mm 0.25 --method uncorrected --seed 3"
+    said = "apo-bench run stick_in_tower --clearance-mm 0.25 --method uncorrected --seed 3"
     assert replay_command(row("uncorrected", 3, **usual)) == replay_command(row("uncorrected", 3)) == said
     other = row(
         "my mod:it's", 9, noise_mm=0.1, noise_deg=0.3, human_error_scale=0.5, noise="a b.toml", contact_source="shifted:3", grasp="weld",
@@ -115,7 +115,7 @@ def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
         *("--seed", "9"),
     ]
     seen = row("contact", 1, noise_mm=0.5, noise_deg=0.0, noise="depth-camera", pose_source="depth-camera")
-    shown = "apo-bench replay stick_in_tower --noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
+    shown = "apo-bench run stick_in_tower --noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
     assert replay_command(seen) == shown
 
 

@@ -25,8 +25,8 @@ from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run
+from apo_bench.trial.endings import record_lost_trial, record_misbehaviour
 from apo_bench.trial.fingerprint import versions
-from apo_bench.trial.outcome_columns import lost, misbehaved
 
 CODE = """
 import ctypes, os, sys, time
@@ -140,7 +140,7 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     film = tmp_path / "film.gif"
     seen = tmp_path / "seen.json"
     trial = [
-        "replay",
+        "run",
         "block_on_block",
         "--human-error-scale",
         "0",
@@ -154,19 +154,19 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     assert main([*trial, "--method", "uncorrected", *written, "--noise-level", "0.1"]) == 0
     capsys.readouterr()
     assert len(imageio.imread(film, index=None)) > 10
-    measured = ["replay", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
+    measured = ["run", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
     late = json.loads(capsys.readouterr().out)
-    assert (late["failure_code"], late["noise"], late["noise_level"]) == ("time_limit", "measured", None)
+    assert (late["failure_code"], late["noise"], late["noise_mm"]) == ("time_limit", "measured", None)
 
 
 def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", "block_on_block", "--method", "unruly:hangs", "--trial-limit", "-1"]) == 2
+    assert main(["run", "block_on_block", "--method", "unruly:hangs", "--trial-limit", "-1"]) == 2
     assert "a limit of -1 s per trial was given" in capsys.readouterr().err
 
 
 TALKS = [
-    "replay",
+    "run",
     "block_on_block",
     "--human-error-scale",
     "0",
@@ -193,9 +193,9 @@ def test_a_row_on_standard_output_stands_there_alone(
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
     spec = TrialConfig("block_on_block", method="paper", seed=4)
-    died = lost(spec, "abc", "worker_died")
-    late = lost(spec, "abc", "time_limit")
-    raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
+    died = record_lost_trial(spec, "abc", "worker_died")
+    late = record_lost_trial(spec, "abc", "time_limit")
+    raised = record_misbehaviour(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
     assert list(died) == list(late) == list(raised)
     assert died["config_hash"] == raised["config_hash"]
     assert (died["success"], died["demonstration"], died["failure_stage"]) == (False, None, "worker")
@@ -208,11 +208,11 @@ def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
     batch = (TrialConfig("block_on_block", method="uncorrected"),)
     other = SweepInputs({"block_on_block": "0123456789abcdef"}, versions())
-    with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
+    with pytest.raises(InputError, match="has other files for 'block_on_block'"):
         list(Worker(other, {}).run(batch))
     with pytest.raises(InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install"):
         Worker(SweepInputs({}, versions() | {"mujoco": "1.2.3"}), {})
-    with pytest.raises(InputError, match="has other code or other files"):
+    with pytest.raises(InputError, match="has other files"):
         pool.run_locally([batch], other, 1, 60.0, lambda row, timing: None)
 
 

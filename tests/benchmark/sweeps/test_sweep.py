@@ -21,12 +21,11 @@ from apo_bench.benchmark.sweeps import sweep as runner
 from apo_bench.benchmark.sweeps import worker
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.records import CORRECTORS, ENV_ID, RECORD_SCHEMA, record_key, setting_columns, trial_key
-from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial import outcome_columns as row_module
-from apo_bench.trial import trial
+from apo_bench.trial import endings, run
+from apo_bench.trial.endings import end_record
 from apo_bench.trial.fingerprint import config_hash
-from apo_bench.trial.outcome_columns import result
 
 METHODS = ("oracle", "uncorrected", "paper")
 SPEC = SweepConfig(
@@ -54,7 +53,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         assert simulated == f"{scene.scenario.name} {spec.human_error_scale} {spec.seed} {spec.pose_source}"
         hashed = config_hash(spec, content)
         success = spec.seed % 2 == 0
-        ended = result(
+        ended = end_record(
             Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
         )
         ended |= {"demonstration": "ok", "sim_time_s": 1.0, "extra_operations": 0}
@@ -67,10 +66,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         }
 
     monkeypatch.setattr("apo_bench.benchmark.sweeps.grid.load_scenario", LOAD)
-    monkeypatch.setattr(row_module, "load_scenario", LOAD)
+    monkeypatch.setattr(endings, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
     monkeypatch.setattr(worker, "demonstration_of", record)
-    monkeypatch.setattr(trial, "run_trial", run_trial)
+    monkeypatch.setattr(run, "run_trial", run_trial)
     return did
 
 
@@ -143,7 +142,7 @@ def test_each_scenario_has_its_own_clearance_by_default() -> None:
 def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path: Path) -> None:
     rows = runner.run_sweep(SPEC, tmp_path / "new" / "run", command="apo-bench sweep ...")
     assert len(rows) == ROWS
-    assert read_rows(tmp_path / "new" / "run") == rows
+    assert read_records(tmp_path / "new" / "run") == rows
     timing = [json.loads(line) for line in (tmp_path / "new" / "run" / "timing.jsonl").open()]
     assert [record_key(t) for t in timing] == [record_key(r) for r in rows]
     assert {"trial_s", "demonstrate_s", "host", "worker"} <= set(timing[0])
@@ -169,19 +168,19 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
     counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = runner.run_sweep(SPEC, tmp_path / "whole")
-    quick = trial.run_trial
+    quick = run.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
         if (spec.seed, spec.method, spec.noise_mm) == (11, "paper", 0.0):
             raise KeyboardInterrupt
         return quick(spec, scene, **more)
 
-    monkeypatch.setattr(trial, "run_trial", interrupted)
+    monkeypatch.setattr(run, "run_trial", interrupted)
     with pytest.raises(KeyboardInterrupt):
         runner.run_sweep(SPEC, tmp_path / "part")
-    left = read_rows(tmp_path / "part")
+    left = read_records(tmp_path / "part")
     assert 0 < len(left) < ROWS
-    monkeypatch.setattr(trial, "run_trial", quick)
+    monkeypatch.setattr(run, "run_trial", quick)
     counted.clear()
     assert runner.run_sweep(SPEC, tmp_path / "part") == whole
     assert counted["trial"] == ROWS - len(left)

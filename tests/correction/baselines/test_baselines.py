@@ -12,7 +12,9 @@ import pytest
 from apo_bench import Assembly, InputError, Observation, correct
 from apo_bench.assembly import Operation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.penalty import intruding, least_squares, loss, meeting
+from apo_bench.correction.baselines.intruding_boxes import intruding, meeting
+from apo_bench.correction.baselines.least_squares import least_squares
+from apo_bench.correction.baselines.penalty import loss
 from apo_bench.geometry import Array, pose
 from apo_bench.geometry.penetration import intrusion
 from apo_bench.simulation.scene.settling import settle

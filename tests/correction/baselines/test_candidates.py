@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from apo_bench import Assembly
 from apo_bench.assembly import Operation, Relation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.track import candidates
+from apo_bench.correction.baselines.candidates import candidates
 from tests import scenes
 from tests.assembly.test_equations import random_scene
 

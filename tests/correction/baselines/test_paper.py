@@ -327,8 +327,8 @@ def returning(**changed: Any) -> Callable[[Observation], Correction]:
         ({"gap_after_m": None}, "gap_after_m of Correction must be a number, got None"),
         ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
         (
-            {"schedule": steps("1 2 3"), "targets": np.tile(np.eye(4), (3, 1, 1))},
-            "returned a last target for operation 1 that is not its goal",
+            {"schedule": steps("1 2 3"), "step_poses": np.tile(np.eye(4), (3, 1, 1))},
+            "returned a last step pose of operation 1 that is not its pose",
         ),
     ],
 )
@@ -348,16 +348,19 @@ def other_status(seen: Observation) -> Correction:
     [
         ("papr", "unknown corrector 'papr'; did you mean 'paper'"),
         ("no_such_module:f", "cannot be imported"),
-        (lambda seen: None, "returned None; return a Correction or goals of shape (3, 4, 4)"),
+        (lambda seen: None, "returned None; return a Correction or poses of shape (3, 4, 4)"),
         (lambda seen: seen.poses[:2], "returned an array of shape (2, 4, 4)"),
-        (reflected, "the corrector 'reflected' returned a goal for operation 2 that is not a rigid pose"),
+        (reflected, "the pose of operation 2 that the corrector 'reflected' returned is not a rigid pose"),
         (other_status, "returned the status 'fine'; return one of converged, not_seen"),
         (scheduled("1 2"), "returned a schedule that leaves operation 3 undone; do operations in order"),
         (scheduled("1 2 4"), "returned a schedule that names operation 4, where 3 are known"),
         (scheduled("1 -2 2 3"), "returned a schedule that undoes operation 2, which is not done"),
         (scheduled("1 2 3 -2"), "returned a schedule that undoes operation 2 before operation 3"),
-        (scheduled("1 2 3", mirrored=True), "returned a target for step 3 of its schedule that is not a rigid pose"),
-        (lambda seen: replace(paper(seen), step_poses=np.zeros((0, 4, 4))), "returned targets and no schedule"),
+        (
+            scheduled("1 2 3", mirrored=True),
+            "the pose of step 3 that the corrector 'scheduling' returned is not a rigid pose",
+        ),
+        (lambda seen: replace(paper(seen), step_poses=np.zeros((0, 4, 4))), "returned step poses and no schedule"),
     ],
 )
 def test_what_correct_refuses(given: object, message: str) -> None:

@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 
 from apo_bench import Correction
 from apo_bench.assembly import largest_gap
-from apo_bench.assembly.goals import once_each
+from apo_bench.assembly.plan import once_each
 from apo_bench.correction.baselines.track import paper_track
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.records import CODES

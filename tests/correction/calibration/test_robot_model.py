@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.correction.calibration.robust_estimate import (
+from apo_bench.correction.calibration.robot_model import (
     Places,
     grasp_in,
     hand_eye_displacement,

@@ -12,13 +12,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from apo_bench.correction.calibration import REFUSED_BEYOND, Touch
-from apo_bench.correction.calibration.robust_estimate import (
-    HAND_EYE,
-    NumberedTouch,
-    Places,
-    part_poses,
-    robust_estimate,
-)
+from apo_bench.correction.calibration.robot_model import HAND_EYE, Places, part_poses
+from apo_bench.correction.calibration.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.geometry import Array, pose
 
 pytestmark = pytest.mark.numeric

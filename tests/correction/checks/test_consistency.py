@@ -12,10 +12,10 @@ from scipy.stats import kstest
 
 from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct, correct_many
 from apo_bench.assembly import Consistency, Contact, PartFace
-from apo_bench.correction.checks.status import p_value
-from apo_bench.correction.contact.contact import MOST_SUSPECTS
+from apo_bench.correction.checks.chi_square import p_value
+from apo_bench.correction.contact.suspects import MOST_SUSPECTS
 from apo_bench.geometry import Face, pose
-from benchmarks.corrector_bench.problems import problem
+from benchmarks.corrector_problems import problem
 from tests import scenes
 from tests.correction.solvers.test_large import fence
 
@@ -183,7 +183,7 @@ def test_two_wrong_relations_are_left_out_one_after_the_other() -> None:
 def test_four_wrong_relations_are_too_many_to_leave_out() -> None:
     off = {f"stick{k}.py on castle{k}.spy": 10.0 for k in range(5)}
     given = problem("chain6")
-    seen = look(scenes.Scene(given.assembly, given.start, given.goals), 0, off)
+    seen = look(scenes.Scene(given.assembly, given.start, given.poses), 0, off)
     made = ContactCorrector("drop")(seen)
     assert len(made.dropped) == 3
     assert made.status == "inconsistent"
@@ -217,7 +217,7 @@ def test_the_level_decides() -> None:
 def test_a_level_or_a_policy_that_is_none_is_refused() -> None:
     for level in (0.0, float("nan")):
         with pytest.raises(InputError, match=r"^a test level of .* was given; a number between 0 and 1 is allowed\.$"):
-            ContactCorrector(noise_level=level)
+            ContactCorrector(level=level)
     with pytest.raises(InputError, match=r"must be one of 'apply', 'warn', 'refuse', 'drop', got 'hope'\.$"):
         ContactCorrector("hope")  # type: ignore[arg-type]
 

@@ -44,13 +44,13 @@ def lopsided(covariance: Array) -> None:
 
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "stretched": (lambda: edited("poses", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
-    "far": (lambda: edited("poses", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
+    "stretched": (lambda: edited("poses", stretched), "the pose of operation 2 in the observation is not a rigid pose"),
+    "far": (lambda: edited("poses", far), "the pose of operation 1 in the observation has a position of 1e+200 m"),
     "lopsided": (
         lambda: edited("covariance", lopsided),
         "the covariance of operation 2 in the observation is not symm",
     ),
-    "play nan": (lambda: replace(seen(), play_m=float("nan")), "states play_m=nan; a finite length from 0 is needed"),
+    "play nan": (lambda: replace(seen(), play_m=float("nan")), "states play_m=nan; give a finite length of 0 or more"),
     "gap zero": (lambda: replace(seen(), gap_m=0.0), "states gap_m=0.0"),
     "no start": (lambda: replace(seen(), start={}), "the observation has no start of the part"),
 }
@@ -73,7 +73,7 @@ def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
             correct_many(given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="the goal of operation 2 in observation 2 is not a rigid pose"):
+    with pytest.raises(InputError, match="the pose of operation 2 in observation 2 is not a rigid pose"):
         correct_many([seen(), edited("poses", stretched)])
 
 
@@ -116,7 +116,10 @@ def test_poses_far_beyond_everything_are_refused() -> None:
         goals[1, 0, 3] = 1e200
         return goals
 
-    for corrector in (away, lambda seen: lying(seen, goals=away(seen))):
-        with pytest.raises(InputError, match=r"returned a goal for operation 2 with a position of 1e\+200 m; return"):
+    for corrector in (away, lambda seen: lying(seen, poses=away(seen))):
+        with pytest.raises(
+            InputError,
+            match=r"the pose of operation 2 that the corrector '.*' returned has a position of 1e\+200 m; give",
+        ):
             correct(seen(), corrector)
     assert correct(seen(), lambda seen: np.full((3, 4, 4), np.inf)).status == "not_finite"

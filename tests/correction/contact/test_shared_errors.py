@@ -77,7 +77,7 @@ def test_the_test_and_the_regions_are_those_of_the_tails() -> None:
     covered = []
     for seed in range(50):
         observation, truth = seen(
-            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, noise_level=0.5
+            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5
         )
         made = correct(observation, "contact")
         p.append(made.test.p_value)
@@ -114,7 +114,7 @@ def test_what_is_known_of_the_camera_is_said() -> None:
 
 
 def test_a_shared_error_above_its_covariance_is_refused() -> None:
-    observation, _ = seen("isotropic", noise_level=1.0)
+    observation, _ = seen("isotropic", level=1.0)
     large = SharedError("camera", (0, 1), np.diag(np.repeat([0.1, 1.0], 3) ** 2), np.eye(4))
     with pytest.raises(InputError, match="the shared errors 'camera' are larger than the covariances"):
         correct(replace(observation, shared=(large,)), "contact")

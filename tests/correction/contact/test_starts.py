@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from apo_bench import ContactCorrector, correct
-from apo_bench.assembly import largest_gap, looking_away
+from apo_bench.assembly import faces_away, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import compact_equations
-from apo_bench.correction.solvers.gauss_newton import descended, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
+from apo_bench.correction.solvers.newton_descent import descended
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown
@@ -72,4 +73,4 @@ def test_where_contacts_bend_newton_ends_where_small_steps_would():
     creeping = nearest_goals(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
     assert not creeping.at_rest
     assert length(seen, creeping.goals) > length(seen, there)
-    assert not looking_away(seen.assembly, seen.start, there).any()
+    assert not faces_away(seen.assembly, seen.start, there).any()

@@ -25,14 +25,14 @@ from apo_bench.correction.robust.noise_scale import likeliest_scale
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import views_of
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.failures import make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
-from apo_bench.trial.outcome_columns import goal_errors
-from tests.correction.robust.test_looks import Again, at_the_same_place
+from apo_bench.trial.pose_error import goal_errors
+from tests.correction.robust.test_reobservations import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
 TOWER = "stick_in_tower"
@@ -50,7 +50,7 @@ def test_a_part_that_is_seen_where_it_was_before_is_said_to_be(seed):
     name = "vanished_fixture"
     observation = look(name, seed)
     first = shown(name, seed)[2]
-    before = (first.start, *placements(first.assembly, first.start, first.goals))[4]["stick"]
+    before = (first.start, *placements(first.assembly, first.start, first.poses))[4]["stick"]
     off = pose.exp(np.repeat([1e-3, np.radians(1.0)], 3) * np.random.default_rng(seed).standard_normal(6))
     found = correct(seen_at(observation, 4, before @ off))
     assert found.left_out == (4,)
@@ -81,7 +81,7 @@ def test_what_is_seen_too_near_says_the_rest_all_the_same(seed):
     found = correct(replace(observation, poses=goals, outliers=told))
     assert found.sentence.endswith("; seen too near or too far: operation 1")
     assert found.left_out == ()
-    truth = shown(TOWER, seed)[2].goals
+    truth = shown(TOWER, seed)[2].poses
     assert fixed_error_mm(TOWER, seed, found) < 0.1
     assert contains_truth(observation, found, truth, 0.999)
 
@@ -105,10 +105,10 @@ def test_two_looks_that_repeat_an_error_are_no_proof():
     k = 1
     wrong = astray(look("carried_bridge", 2), k)
     second = at_the_same_place("carried_bridge", 2, 0)
-    again = seen_at(second, k, wrong.goals[k] @ pose.exp(np.repeat([3e-4, 3e-3], 3)))
+    again = seen_at(second, k, wrong.poses[k] @ pose.exp(np.repeat([3e-4, 3e-3], 3)))
     for repeat, believed in ((0.8, False), (0.2, False)):
         model = OutlierModel(repeat=repeat)
-        found = correct(replace(wrong, outliers=model), look=Again(again))
+        found = correct(replace(wrong, outliers=model), reobserve=Again(again))
         assert found.ok
         assert (k not in found.left_out) == believed
         assert found.dropped == ()
@@ -173,8 +173,10 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     noise = make_failures("flips", NoiseLevel(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
-    looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
-    assert correct(seen, look=looks).ok
+    looks = Reobservations(
+        first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1])
+    )
+    assert correct(seen, reobserve=looks).ok
     assert counts
     assert max(counts) < 300
 
@@ -188,7 +190,7 @@ def test_noise_that_is_twice_what_is_stated_is_noticed_and_nothing_is_left_out()
         found = correct(stated)
         assert found.left_out == found.dropped == ()
         scales.append(found.noise_scale)
-        covered.append(contains_truth(stated, found, shown("vanished_fixture", seed)[2].goals))
+        covered.append(contains_truth(stated, found, shown("vanished_fixture", seed)[2].poses))
         if found.noise_scale > 1.5:
             assert "as noisy as stated" in found.sentence
     assert 1.7 < np.median(scales) < 2.3
@@ -215,7 +217,7 @@ def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
     layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
     first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((10, 6, 6)))
     seen = make_noise("isotropic", NoiseLevel(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
-    wrong = with_contacts(seen, make_contacts("false"), layout.poses, np.random.default_rng([13, 9]))
+    wrong = with_contacts(seen, make_contacts("false-positive"), layout.poses, np.random.default_rng([13, 9]))
     found = correct(wrong)
     assert found.ok
     assert found.dropped

@@ -8,7 +8,7 @@ import pytest
 from apo_bench.assembly import Hypothesis, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.robust.beliefs import mode_covariance
+from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look
 
@@ -53,7 +53,7 @@ def test_the_region_of_a_correction_is_that_of_enough_hypotheses(observation):
     truth = found.poses
     away = replace(observation, poses=observation.poses @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 3.0])))
     right = Hypothesis(0.1, truth, found.covariance, observation)
-    wrong = Hypothesis(0.9, away.goals, found.covariance, away)
+    wrong = Hypothesis(0.9, away.poses, found.covariance, away)
     assert contains_truth(observation, replace(found, hypotheses=(wrong, right)), truth)
     sure = (replace(wrong, weight=0.99), replace(right, weight=0.01))
     assert not contains_truth(observation, replace(found, hypotheses=sure), truth)

@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, largest_gap, looking_away, placements
+from apo_bench.assembly import OutlierModel, faces_away, largest_gap, placements
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import p_value
+from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.region import contains_truth
@@ -29,7 +29,7 @@ from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, with_contacts
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 from tests.shipped import BOXES
 
 
@@ -87,7 +87,7 @@ def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
             found = correct(observation, "contact-robust")
             assert found.ok
             assert largest_gap(scenario.assembly, observation.start, found.poses) <= observation.gap_m
-            assert not looking_away(scenario.assembly, observation.start, found.poses).any()
+            assert not faces_away(scenario.assembly, observation.start, found.poses).any()
             all_of_them += 1
             right += found.left_out == (k,) and f"; left out what was seen of operation {k + 1}" in found.sentence
     assert right >= all_of_them - 1
@@ -97,7 +97,7 @@ def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
 def test_what_was_missed_is_inferred(name):
     n = len(shown(name, 3)[0].assembly)
     seen = np.arange(n) != n - 2
-    observation = replace(look(name, 3, 0.5), seen=seen)
+    observation = replace(look(name, 3, 0.5), observed=seen)
     found = correct(observation, "contact-robust")
     assert found.ok
     assert found.left_out == (n - 2,)
@@ -113,14 +113,14 @@ def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one
     assert inferred.baseless == ()
     observation = replace(exact, poses=inferred.goals)
     assert largest_gap(scenario.assembly, layout.start, observation.poses) < 2e-3
-    assert not looking_away(scenario.assembly, layout.start, observation.poses).any()
+    assert not faces_away(scenario.assembly, layout.start, observation.poses).any()
 
 
 def test_planes_that_are_parallel_but_for_noise_do_not_say_where_they_meet():
     """The stick lies in two slots that were seen a little turned; along them only the middles of faces say where."""
     for seed in range(4):
         observation = look("vanished_fixture", seed)
-        truth = shown("vanished_fixture", seed)[1].goals
+        truth = shown("vanished_fixture", seed)[1].poses
         k = len(truth) - 1
         found = inferred_goals(astray(observation, k, seed), [k]).goals[k]
         assert np.linalg.norm(found[:3, 3] - truth[k][:3, 3]) < 0.03
@@ -131,7 +131,7 @@ def test_an_operation_of_which_nothing_is_told_stays_unseen():
     operations = [replace(one, contacts=()) for one in scenario.assembly.operations]
     lonely = replace(scenario.assembly, operations=tuple(operations))
     seen = np.arange(len(lonely)) != 0
-    observation = replace(look("block_on_block", 0), assembly=lonely, seen=seen)
+    observation = replace(look("block_on_block", 0), assembly=lonely, observed=seen)
     assert correct(observation, "contact-robust").status == "not_seen"
 
 
@@ -140,7 +140,7 @@ def test_a_single_operation_that_was_seen_turned_is_turned_back():
     made = look("block_on_block", 0)
     single = replace(made.assembly, operations=made.assembly.operations[:1])
     about_y = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
-    turned = made.goals[:1] @ about_y
+    turned = made.poses[:1] @ about_y
     stated = OutlierModel(gross=0.3)
     one = {"poses": turned, "covariance": made.covariance[:1], "observed": made.observed[:1]}
     observation = replace(made, assembly=single, outliers=stated, **one)
@@ -148,7 +148,7 @@ def test_a_single_operation_that_was_seen_turned_is_turned_back():
     assert found.ok
     assert found.dropped == ()
     assert "seen turned: operation 1" in found.sentence
-    assert not looking_away(single, made.start, found.poses).any()
+    assert not faces_away(single, made.start, found.poses).any()
 
 
 def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
@@ -171,7 +171,7 @@ def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
 def test_states_are_weighed_by_how_likely_they_make_what_was_seen():
     model = OutlierModel()
     right = look("carried_bridge", 6)
-    n = len(right.goals)
+    n = len(right.poses)
     inliers = ((INLIER,),) * n
     for state in (BROAD, GROSS):
         case = Case(right, views_of(right), model)
@@ -213,7 +213,7 @@ def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
     observation = look("vanished_fixture", 5)
     wrong = with_contacts(
-        observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].goals, np.random.default_rng(1)
+        observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
     )
     found = correct(wrong, "contact-robust")
     assert found.ok
@@ -240,7 +240,7 @@ def test_what_is_inferred_is_no_degree_of_freedom_of_the_test():
 def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(seed):
     """Without the whole relation the goal would be as far off as it was seen."""
     observation = look("pocket_table", seed)
-    truth = shown("pocket_table", seed)[1].goals
+    truth = shown("pocket_table", seed)[1].poses
     wrong = with_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
     found = correct(wrong, "contact-robust")
     assert found.ok
@@ -253,7 +253,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
 @pytest.mark.parametrize("seed", range(5, 9))
 def test_a_pose_that_is_flipped_is_turned_back_and_no_relation_is_blamed(seed):
     observation = look("vanished_fixture", seed)
-    truth = shown("vanished_fixture", seed)[1].goals
+    truth = shown("vanished_fixture", seed)[1].poses
     goals = np.array(observation.poses)
     goals[1] = goals[1] @ pose.at((0.0, 0.0, 0.0), (0.0, 180.0, 0.0))
     found = correct(replace(observation, poses=goals), "contact-robust")

@@ -16,7 +16,7 @@ from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
 from apo_bench.geometry import Array
-from benchmarks.corrector_bench.problems import problem
+from benchmarks.corrector_problems import problem
 from tests import scenes
 from tests.correction.solvers.test_manifold import correction, crooked, scales, system_of, twisted
 
@@ -48,7 +48,7 @@ def fence(n: int) -> scenes.Scene:
 
 def of_problem(name: str) -> scenes.Scene:
     given = problem(name)
-    return scenes.Scene(given.assembly, given.start, given.goals)
+    return scenes.Scene(given.assembly, given.start, given.poses)
 
 
 SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {

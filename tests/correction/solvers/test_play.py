@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench import Demonstration, Observation, correct, correct_many, observe
+from apo_bench import Demonstration, correct, correct_many, observe
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import fit_deviation, softened_chi_square
+from apo_bench.correction.checks.chi_square import fit_deviation, softened_chi_square
 from apo_bench.correction.contact.contact import contact_refuse
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.play import fit_covariance, plays
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from benchmarks.corrector_bench.draws import draw
-from benchmarks.corrector_bench.problems import chain
+from benchmarks import corrector_problems
 from tests.correction.robust.test_robust import look, shown
 
 PLAY_M = 0.25e-3
@@ -67,11 +66,9 @@ def test_faces_that_look_opposite_ways_are_off_by_the_same():
 
 def test_many_operations_that_fit_are_corrected():
     """Ten operations: equations are sparse, what play does to them together is not."""
-    of = chain(6)
-    assembly = replace(of.assembly, operations=of.assembly.operations[:-1])
-    seen = draw(of, "2/1", 0)
-    observation = Observation(assembly, of.start, seen.seen[:10], seen.covariance[:10], np.ones(10, bool), 1e-4, PLAY_M)
-    found = correct(observation, "contact")
+    of = corrector_problems.chain(6)
+    ten = of._replace(assembly=replace(of.assembly, operations=of.assembly.operations[:-1]), poses=of.poses[:10])
+    found = correct(replace(corrector_problems.observe(ten, 0), play_m=PLAY_M), "contact")
     assert found.ok
     assert found.test.passes
 

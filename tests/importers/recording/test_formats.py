@@ -13,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.importers.recording.camera_file import Conventions, read_camera
 from apo_bench.importers.recording.formats import FORMATS, read_log
 from apo_bench.importers.recording.objects_file import name_tracks, read_objects
-from benchmarks.recording_forms import FORMS, Tracked
+from tests.importers.recording.log_forms import FORMS, Tracked
 from tests.recorded import CAMERA, RATE_HZ, motion
 
 

@@ -17,7 +17,7 @@ from apo_bench.importers.recording.ordering import Stated
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.importers.recording.unplanned import unplanned_recording
 from apo_bench.scenario.layout import layout_at
-from benchmarks.recording_demos import Errors, first_places, tracked, watched
+from tests.importers.recording.tracked_demonstrations import Errors, first_places, tracked, watched
 from tests.recorded import CAMERA, seen
 
 NOTHING = Stated()

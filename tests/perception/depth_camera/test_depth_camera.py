@@ -218,7 +218,7 @@ def test_a_trial_through_the_range_finder() -> None:
 
 def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "eye.png"
-    assert main(["pose_source", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
+    assert main(["inspect", "depth", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
     form = json.loads(capsys.readouterr().out)
     assert form["schema"] == "apo-bench/eye/1"
     assert [operation["found"] for operation in form["operations"]] == [True, True]
@@ -276,10 +276,10 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     drawn = figure_texts(out)
     for name, texts in drawn.items():
         assert not [text for text in texts if "deg" in text or "range noise" in text], name
-    for name in ("success_over_level", "gap_before_and_after"):
+    for name in ("success_over_noise_level", "gap_before_and_after"):
         assert {"level: mm per ray", "0.5"} <= set(drawn[name])
     assert "0.5 mm per ray" in drawn["detected"]
-    assert "range finder, relations recognised" in " ".join(drawn["success_over_level"])
+    assert "range finder, relations recognised" in " ".join(drawn["success_over_noise_level"])
 
 
 def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
         ]
     assert main(["report", str(out)]) == 0
     axis = "level: mm and degrees per axis; level: mm per ray"
-    assert axis in figure_texts(out)["success_over_level"]
+    assert axis in figure_texts(out)["success_over_noise_level"]
     page = pages.words(out / "report.html")
     assert "of the range finder it is one of L mm per ray" in page
 
@@ -322,7 +322,7 @@ def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     monkeypatch.setattr(
         "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
-    assert main(["pose_source", "block_on_block", *wrong]) == 2
+    assert main(["inspect", "depth", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
     assert said
     assert "Traceback" not in said

@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario, recognise
+from apo_bench import Assembly, InputError, Observation, correct, detect_contacts, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
-from apo_bench.perception.observation.models.displaced import floored
+from apo_bench.perception.observation.models.displacement import floor_covariance
 from apo_bench.scenario.file import scenario_names
-from apo_bench.trial.detected_contacts import count_contacts, with_recognised_contacts
+from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
 from tests import scenes
 
 NAMES = sorted(scenes.ALL)
@@ -40,7 +40,7 @@ def stated(seen: Observation, noise_level: float, play_m: float = 0.0) -> Observ
     covariance = np.tile(
         np.diag(np.repeat([noise_level * 1e-3, np.radians(noise_level)], 3) ** 2), (len(seen.poses), 1, 1)
     )
-    return replace(seen, covariance=floored(covariance), play_m=play_m)
+    return replace(seen, covariance=floor_covariance(covariance), play_m=play_m)
 
 
 def without_contacts(assembly: Assembly) -> Assembly:
@@ -57,7 +57,7 @@ def blocks(apart_mm: float, noise_level: float) -> Observation:
 
 
 def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
-    return any(str(e.contact) == "B.nx on A.px" for e in recognise(seen, rules).evidence)
+    return any(str(e.contact) == "B.nx on A.px" for e in detect_contacts(seen, rules).evidence)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -66,7 +66,7 @@ def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float)
     """Rounding can only decide where there is no noise."""
     scene = scenes.ALL[name]()
     for seed in range(3):
-        recognised = recognise(seen_at(scene, seed, noise_level))
+        recognised = detect_contacts(seen_at(scene, seed, noise_level))
         assert contacts(recognised.assembly) == contacts(scene.assembly)
         assert tuple(e.contact for e in recognised.evidence) == tuple(
             r.contact for r in recognised.assembly.relations()
@@ -81,7 +81,7 @@ def test_scenarios_of_the_package_are_recognised_with_their_own_play(name: str) 
         layout = draw_layout(scenario, np.random.default_rng(seed))
         scene = scenes.Scene(scenario.assembly, layout.start, layout.poses)
         seen = seen_at(scene, seed, 0.5, play_m=scenario.clearance_mm * 1e-3)
-        assert contacts(recognise(seen).assembly) == contacts(scenario.assembly)
+        assert contacts(detect_contacts(seen).assembly) == contacts(scenario.assembly)
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "subassembly_on_castles", "fixture", "pockets"])
@@ -93,15 +93,15 @@ def test_a_part_that_was_put_aside_still_touches_what_it_touches(name: str) -> N
     wide = np.array(exact.covariance)
     aside = [1, 2] if name == "fixture" else [1]
     wide[aside, along, along] += 2.85e-3**2
-    assert contacts(recognise(replace(exact, covariance=wide)).assembly) == contacts(scene.assembly)
-    assert contacts(recognise(exact).assembly) < contacts(scene.assembly)
+    assert contacts(detect_contacts(replace(exact, covariance=wide)).assembly) == contacts(scene.assembly)
+    assert contacts(detect_contacts(exact).assembly) < contacts(scene.assembly)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_contacts_that_came_with_it_are_not_looked_at(name: str) -> None:
     seen = seen_at(scenes.ALL[name](), 5, 1.0)
     bare = replace(seen, assembly=without_contacts(seen.assembly))
-    assert recognise(seen).evidence == recognise(bare).evidence
+    assert detect_contacts(seen).evidence == detect_contacts(bare).evidence
 
 
 @pytest.mark.numeric
@@ -112,8 +112,8 @@ def test_the_world_frame_does_not_matter(name: str) -> None:
     for seed in (7, 8):
         here = seen_at(scene, seed, 1.0)
         there = seen_at(scenes.turned(scene, T), seed, 1.0)
-        found = recognise(here).evidence
-        again = recognise(there).evidence
+        found = detect_contacts(here).evidence
+        again = detect_contacts(there).evidence
         assert [(e.made, e.contact) for e in found] == [(e.made, e.contact) for e in again]
         assert_allclose([e.gap_m for e in found], [e.gap_m for e in again], rtol=0, atol=1e-7)
         assert_allclose([e.most for e in found], [e.most for e in again], rtol=1e-4, atol=1e-7)
@@ -142,14 +142,14 @@ def test_of_contacts_that_exclude_each_other_those_are_taken_that_fit_together()
     scene = scenes.subassembly_on_castles()
     goals = np.array(scene.goals)
     goals[2, 2, 3] -= 4.5e-3
-    found = recognise(stated(scenes.seen(scene, goals), 2.0))
+    found = detect_contacts(stated(scenes.seen(scene, goals), 2.0))
     of_cube = {str(e.contact) for e in found.evidence if e.made == 2}
     assert of_cube == {"cube.nz on castle1.topP", "cube.nz on castle1.topN"}
 
 
 def test_parts_that_are_carried_keep_the_contacts_among_themselves() -> None:
     scene = scenes.pockets()
-    found = recognise(seen_at(scene, 1, 0.5))
+    found = detect_contacts(seen_at(scene, 1, 0.5))
     assert not [e for e in found.evidence if e.made == 5 and "stick" in (e.contact.manipulated.part, e.contact[1].part)]
 
 
@@ -157,14 +157,14 @@ def test_what_was_not_seen_touches_nothing() -> None:
     scene = scenes.stick_in_tower()
     seen = replace(seen_at(scene, 0, 0.5), observed=np.array([True, False, True]))
     right = {(k, c) for k, c in contacts(scene.assembly) if "castle2" not in (c.manipulated.part, c.environment.part)}
-    assert contacts(recognise(seen).assembly) == right
+    assert contacts(detect_contacts(seen).assembly) == right
 
 
 def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None:
     scene = scenes.stick_on_castles()
     goals = np.array(scene.goals)
     goals[:, 2, 3] += [0.1, 0.2, 0.35]
-    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "detected")
+    seen = with_detected_contacts(stated(scenes.seen(scene, goals), 0.5), "detected")
     assert not seen.assembly.relations()
     assert correct(seen, "contact").ok
     assert correct(seen, "paper").ok
@@ -173,8 +173,10 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
 @pytest.mark.parametrize("wrong", [(None,), ("seen", "fixed")])
 def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
     given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
-    with pytest.raises(InputError, match=r"(observation|rules) of recognise must be an? (Observation|Rules), got"):
-        recognise(*given)
+    with pytest.raises(
+        InputError, match=r"(observation|rules) of detect_contacts must be an? (Observation|Rules), got"
+    ):
+        detect_contacts(*given)
 
 
 def test_kinds_of_gaps_are_not_looked_at() -> None:
@@ -183,7 +185,7 @@ def test_kinds_of_gaps_are_not_looked_at() -> None:
     with_gap = replace(scenario.assembly, gaps={contact: Gap("contact")})
     layout = draw_layout(scenario, np.random.default_rng(0))
     seen = stated(scenes.seen(scenes.Scene(with_gap, layout.start, layout.poses), layout.poses), 0.5)
-    assert not recognise(seen).assembly.gaps
+    assert not detect_contacts(seen).assembly.gaps
 
 
 def test_contacts_are_counted_against_the_right_ones() -> None:
@@ -298,7 +300,7 @@ def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
     after = belief
     for J in rows:
-        after = after.conditioned(np.zeros(3), J, noise)
+        after = after.condition(np.zeros(3), J, noise)
     J = np.concatenate(rows)
     R = np.kron(np.eye(2), noise)
     P = belief.covariance

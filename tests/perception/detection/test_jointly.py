@@ -16,7 +16,7 @@ from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Hull, pose, ways_out
 from apo_bench.geometry.penetration import intrusion
 from apo_bench.perception.detection.estimate import estimate
-from apo_bench.perception.detection.jointly import recognise_jointly
+from apo_bench.perception.detection.jointly import detect_contacts_jointly
 from tests import rounds, scenes
 from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated, without_contacts
 
@@ -101,7 +101,7 @@ def test_a_contact_that_others_imply_gains_nothing() -> None:
 @pytest.mark.parametrize("noise_level", [0.5, 2.0])
 def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float) -> None:
     scene = scenes.ALL[name]()
-    recognised = recognise_jointly(seen_at(scene, 0, noise_level))
+    recognised = detect_contacts_jointly(seen_at(scene, 0, noise_level))
     assert contacts(recognised.assembly) == contacts(scene.assembly)
     assert tuple(e.contact for e in recognised.evidence) == tuple(r.contact for r in recognised.assembly.relations())
     assert recognised.probability is not None
@@ -112,18 +112,18 @@ def test_contacts_that_come_with_the_observation_are_not_looked_at() -> None:
     scene = scenes.ALL[NAMES[0]]()
     seen = seen_at(scene, 0, 1.0)
     blind = replace(seen, assembly=without_contacts(seen.assembly))
-    assert contacts(recognise_jointly(seen).assembly) == contacts(recognise_jointly(blind).assembly)
+    assert contacts(detect_contacts_jointly(seen).assembly) == contacts(detect_contacts_jointly(blind).assembly)
 
 
 def test_near_faces_touch_if_the_noise_explains_the_gap() -> None:
-    assert names(recognise_jointly(beside(1.0, 1.0)).assembly) >= {"B.nx on A.px"}
-    assert "B.nx on A.px" not in names(recognise_jointly(beside(8.0, 1.0)).assembly)
-    assert "B.nx on A.px" not in names(recognise_jointly(beside(1.0, 0.1)).assembly)
+    assert names(detect_contacts_jointly(beside(1.0, 1.0)).assembly) >= {"B.nx on A.px"}
+    assert "B.nx on A.px" not in names(detect_contacts_jointly(beside(8.0, 1.0)).assembly)
+    assert "B.nx on A.px" not in names(detect_contacts_jointly(beside(1.0, 0.1)).assembly)
 
 
 def test_probabilities_say_what_is_not_certain() -> None:
-    sure = recognise_jointly(beside(30.0, 1.0))
-    unsure = recognise_jointly(beside(4.0, 1.5))
+    sure = detect_contacts_jointly(beside(30.0, 1.0))
+    unsure = detect_contacts_jointly(beside(4.0, 1.5))
     assert sure.probability is not None
     assert sure.probability > 0.99
     assert unsure.probability is not None
@@ -135,13 +135,13 @@ def test_probabilities_say_what_is_not_certain() -> None:
 
 def test_what_is_let_go_of_lies_on_something_however_far_it_was_seen_above() -> None:
     """3.7 deviations above the table is little beside hanging in the air."""
-    assert names(recognise_jointly(block_at(0, 0, 25 + 15, noise_level=4.0)).assembly) == {"A.nz on table.top"}
+    assert names(detect_contacts_jointly(block_at(0, 0, 25 + 15, noise_level=4.0)).assembly) == {"A.nz on table.top"}
 
 
 def test_parts_that_are_seen_inside_each_other_touch() -> None:
     """5.3 mm apart may be a gap, 5.3 mm inside each other cannot be: touching is likelier there."""
-    apart = recognise_jointly(beside(5.3, 1.0))
-    within = recognise_jointly(beside(-5.3, 1.0))
+    apart = detect_contacts_jointly(beside(5.3, 1.0))
+    within = detect_contacts_jointly(beside(-5.3, 1.0))
     assert "B.nx on A.px" not in names(apart.assembly)
     assert "B.nx on A.px" in names(within.assembly)
 
@@ -149,7 +149,7 @@ def test_parts_that_are_seen_inside_each_other_touch() -> None:
 def test_operations_that_were_not_seen_make_no_contact() -> None:
     seen = beside(0.5, 1.0)
     blind = replace(seen, observed=np.array([True, False]))
-    assert names(recognise_jointly(blind).assembly) == {"A.nz on table.top"}
+    assert names(detect_contacts_jointly(blind).assembly) == {"A.nz on table.top"}
 
 
 @pytest.mark.parametrize("hulls", [False, True])
@@ -173,11 +173,11 @@ def test_round_faces_are_recognised_with_flat_ones() -> None:
     """A peg in the bore of a plate, both on the table."""
     scene = rounds.peg_in_plate()
     goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
-    recognised = recognise_jointly(stated(scenes.seen(scene, goals), 0.5))
+    recognised = detect_contacts_jointly(stated(scenes.seen(scene, goals), 0.5))
     assert contacts(recognised.assembly) == contacts(scene.assembly)
 
 
 @pytest.mark.parametrize("given", [None, {"rules": 3}])
 def test_anything_else_is_refused(given: Any) -> None:
-    with pytest.raises(InputError, match=r"(observation|rules) of recognise_jointly must be"):
-        recognise_jointly(*([None] if given is None else [beside(1.0, 1.0)]), **(given or {}))
+    with pytest.raises(InputError, match=r"(observation|rules) of detect_contacts_jointly must be"):
+        detect_contacts_jointly(*([None] if given is None else [beside(1.0, 1.0)]), **(given or {}))

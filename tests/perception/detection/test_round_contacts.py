@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench import recognise
+from apo_bench import detect_contacts
 from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array, Face, RoundFace, pose
@@ -32,7 +32,7 @@ def built(name: str) -> scenes.Scene:
 def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float) -> None:
     scene = built(name)
     for seed in range(3):
-        recognised = recognise(seen_at(scene, seed, noise_level, play_m=0.1e-3))
+        recognised = detect_contacts(seen_at(scene, seed, noise_level, play_m=0.1e-3))
         assert contacts(recognised.assembly) == contacts(scene.assembly)
         assert tuple(e.contact for e in recognised.evidence) == tuple(
             r.contact for r in recognised.assembly.relations()
@@ -44,8 +44,8 @@ def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
     seen = seen_at(scene, 4, 0.5)
     goals = np.array(seen.poses)
     goals[2] = goals[2] @ pose.exp([0, 0, 0, 0, 0, 2.1])
-    recognised = recognise(seen)
-    again = recognise(replace(seen, poses=goals))
+    recognised = detect_contacts(seen)
+    again = detect_contacts(replace(seen, poses=goals))
     assert contacts(again.assembly) == contacts(scene.assembly)
     assert_allclose([e.gap_m for e in again.evidence], [e.gap_m for e in recognised.evidence], rtol=0, atol=5e-5)
     assert_allclose(
@@ -67,7 +67,7 @@ def test_a_peg_beside_its_bore_is_not_in_it() -> None:
     for aside_mm, above_mm, within in ((0.3, 0, True), (2.5, 0, False), (0.0, 18, False)):
         goals = np.array(scene.goals)
         goals[1, :3, 3] += [1e-3 * aside_mm, 0.0, 1e-3 * above_mm]
-        recognised = recognise(stated(scenes.seen(scene, goals), 0.2))
+        recognised = detect_contacts(stated(scenes.seen(scene, goals), 0.2))
         assert any(str(e.contact) == "peg.wall on plate.bore" for e in recognised.evidence) is within
 
 

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.geometry import approximate_symmetries, pose
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.models.failures import PRESETS, CameraFailures, make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.reobservations import Reobservations
 
 NOISE_LEVEL = NoiseLevel(1.0, 1.0)
 
@@ -98,7 +98,7 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
     for seed in range(300):
         model = make_failures("rays", NOISE_LEVEL, repeat=repeat)
         first = model.draw_false(shown, np.random.default_rng(seed))
-        look = Looks(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
+        look = Reobservations(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
         seen = look(range(5))
         near = np.linalg.norm(seen.poses[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
         repeated += near[first.false].tolist()

@@ -18,10 +18,10 @@ from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import sighted
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.isotropic import Isotropic
 from apo_bench.perception.observation.noise import FAILURES, NOISES, Noise, NoiseLevel, make_noise
-from apo_bench.trial import trial
+from apo_bench.trial import run
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream
 from tests import scenes
@@ -228,12 +228,12 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
         carried_out.append(plan)
         raise Carried
 
-    monkeypatch.setattr(trial, "replay_and_judge", refuse)
-    monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
-    monkeypatch.setattr(trial, "predict_success", lambda *_: 1.0)  # so does this
+    monkeypatch.setattr(run, "replay_and_judge", refuse)
+    monkeypatch.setattr(run, "predicted_outcome", lambda *_: "")  # which needs an arm
+    monkeypatch.setattr(run, "predict_success", lambda *_: 1.0)  # so does this
     spec = TrialConfig("carried_bridge", noise_mm=1.5, noise_deg=0.5, noise=name, method="uncorrected", seed=5)
     with pytest.raises(Carried):
-        trial.run_trial(spec, scene, simulated=simulated, content="any")
+        run.run_trial(spec, scene, simulated=simulated, content="any")
     expected = make_noise(name, NoiseLevel(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
     assert expected.observed.all()
     assert carried_out[0].goals.tobytes() == expected.poses.tobytes()

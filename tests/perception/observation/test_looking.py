@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from apo_bench import Demonstration, InputError, draw_layout, load_scenario
-from apo_bench.perception.observation.looking import Looks
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
 
 N = 5
 
@@ -21,7 +21,7 @@ def demonstration():
 
 def looks(allowed, noise="isotropic", assembly=None):
     model = make_noise(noise, NoiseLevel(1.0, 1.0))
-    return Looks(demonstration(), model, np.random.default_rng(7), allowed, assembly)
+    return Reobservations(demonstration(), model, np.random.default_rng(7), allowed, assembly)
 
 
 def test_what_was_not_asked_for_is_not_seen():

@@ -19,7 +19,7 @@ from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.empirical import Empirical, read_residuals, residuals_text
 from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, ConstantError, Fitted, ViewNoise, restated
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
@@ -314,7 +314,7 @@ def test_bad_noise_files_are_refused(
     with pytest.raises(InputError, match=message) as raised:
         make_noise(str(path), NOISE_LEVEL)
     assert str(path) in str(raised.value)
-    assert main(["noise", "card", str(path)]) == 2
+    assert main(["noise", "show", str(path)]) == 2
     assert capsys.readouterr().err == f"apo-bench: {raised.value}\n"
 
 

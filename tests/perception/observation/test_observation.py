@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR, floored
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR, floor_covariance
 from apo_bench.perception.observation.models.isotropic import Isotropic
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
@@ -40,7 +40,7 @@ def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
     rng = np.random.default_rng(seed)
     axis = rng.standard_normal(6) * COVARIANCE_FLOOR * 20
     C = np.outer(axis, axis)[None]
-    raised = floored(C)
+    raised = floor_covariance(C)
     assert_array_equal(raised, np.swapaxes(raised, 1, 2))
     unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
     assert np.linalg.eigvalsh(raised[0] / unit).min() > 1 - 1e-9
@@ -50,7 +50,7 @@ def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
 
 def test_what_is_above_the_floor_is_left_alone() -> None:
     C = np.tile(np.diag((3 * COVARIANCE_FLOOR) ** 2), (2, 1, 1))
-    assert_array_equal(floored(C), C)
+    assert_array_equal(floor_covariance(C), C)
 
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
@@ -103,7 +103,7 @@ SKEWED[1, 0, 1] = 1e-7
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.goals.Observation"),
+        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.Observation"),
         (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
         (replace(GOOD, start={}), "changed which parts have a start pose"),
         (replace(GOOD, poses=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),

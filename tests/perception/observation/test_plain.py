@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import InputError, observe
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.perception.observation.plain import Plain
@@ -117,9 +117,9 @@ def test_a_plain_function_by_module_and_name(tmp_path: Path, monkeypatch: pytest
         "def undeclared(goals, rng):\n    return goals\n"
     )
     monkeypatch.chdir(tmp_path)
-    assert main(["noise", "card", "plain_noise_here:high"]) == 0
+    assert main(["noise", "show", "plain_noise_here:high"]) == 0
     assert "# plain_noise_here:high: " in capsys.readouterr().out
-    assert main(["noise", "card", "plain_noise_here:undeclared"]) == 2
+    assert main(["noise", "show", "plain_noise_here:undeclared"]) == 2
     output = capsys.readouterr().err
     assert output.count("\n") == 1
     assert "undeclared.deviation_mm" in output
@@ -138,7 +138,7 @@ def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.Ca
 
 
 def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["noise", "card", "camera", "--noise-level", "2"]) == 0
+    assert main(["noise", "show", "camera", "--noise-level", "2"]) == 0
     text = capsys.readouterr().out
     about = find_facts("camera")
     assert text.startswith(f"# camera: {about.title}\n")
@@ -149,7 +149,7 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("name", sorted([*NOISES, *presets()]))
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
-    """Written by `python docs/noise.py`."""
+    """Written by `python docs/noise_sheets.py`."""
     page = (Path(__file__).parents[3] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
     where = "as measured" if name in presets() else "at 1 mm and 1 deg"
     assert f"{describe_model(name, 2)}\nErrors {where}, " in page
@@ -192,16 +192,16 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     blind = tmp_path / "blind.toml"
     text = presets()["megapose-lmo"].read_text(encoding="utf-8")
     blind.write_text(re.sub("missed_rate = [0-9.]+", "missed_rate = 1", text), encoding="utf-8")
-    assert main(["noise", "card", str(blind)]) == 0
+    assert main(["noise", "show", str(blind)]) == 0
     assert capsys.readouterr().out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["card", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        (["card", "isotropic", "--noise-level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
-        (["card", "megapose"], "did you mean 'megapose-lmo'"),
+        (["show", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
+        (["show", "isotropic", "--noise-level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
+        (["show", "megapose"], "did you mean 'megapose-lmo'"),
     ],
 )
 def test_wrong_requests(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

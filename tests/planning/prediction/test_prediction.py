@@ -180,9 +180,9 @@ def test_work_that_is_taken_apart_is_looked_at_as_it_is_redone() -> None:
     wrong = off(scene, 2, scenes.mm(0, 3, 0))
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
     targets = np.array([scene.goals[0], wrong[1], wrong[1], scene.goals[1], scene.goals[2]])
-    assert said(scene, scene.goals, schedule=schedule, targets=targets).code == "ok"
+    assert said(scene, scene.goals, schedule=schedule, step_poses=targets).code == "ok"
     targets[3] = wrong[1]
-    found = said(scene, wrong, schedule=schedule, targets=targets)
+    found = said(scene, wrong, schedule=schedule, step_poses=targets)
     assert (found.operation, found.code) == (2, "residual")
 
 

@@ -17,9 +17,9 @@ from apo_bench.errors import InputError
 from apo_bench.importers.assembly.touching import found_contacts
 from apo_bench.perception.observation.observing import observe
 from apo_bench.scenario import draw_layout, is_named, nominal_operations, scenario_path
-from apo_bench.scenario.generated import FAMILIES, drawn, whole_name, write_generated
+from apo_bench.scenario.generated import FAMILIES, generate_assembly, whole_name, write_generated
 from apo_bench.scenario.parts import load_part
-from apo_bench.trial.outcome_columns import goal_errors
+from apo_bench.trial.pose_error import goal_errors
 
 SMALL = (
     "generated:corners:2",
@@ -47,7 +47,7 @@ def scenario(request: pytest.FixtureRequest) -> Scenario:
 @given(st.sampled_from([*FAMILIES]), seeds)
 def test_an_assembly_is_whole(family: str, seed: int) -> None:
     """As many parts as its family may have; all but the fixed ones are moved, onto what is there, by unique names."""
-    made = drawn(f"generated:{family}:{seed}")
+    made, _ = generate_assembly(f"generated:{family}:{seed}")
     low, high = FAMILIES[family].sizes
     assert low <= len(made.parts) <= high
     there = {*made.fixed}

@@ -23,10 +23,10 @@ from apo_bench.scenario.parts.making import (
     extrude,
     polygon,
     rectangle,
-    rounded,
+    revolve,
+    round_corners,
     slot,
     solid_of,
-    turned,
     write_part,
 )
 from apo_bench.scenario.parts.making.outline import outline_moments, ring
@@ -84,7 +84,7 @@ def random_plate(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
         volume -= np.pi * r**2 * h + cone(r, c)
         sides[f"bore{i}"] = (at, r, 0.0, h - c, True)
     return (
-        extrude(rounded(outline, corner, sides=64), 0, h, bores=bores, bottom="bottom", top="top"),
+        extrude(round_corners(outline, corner, sides=64), 0, h, bores=bores, bottom="bottom", top="top"),
         volume,
         sides,
         flats,
@@ -109,7 +109,7 @@ def random_bush(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
         "wide": ((0, 0), r + wide, h / 2, h, True),
     }
     flats = {"end": ((0, 0, -1), 0.0), "shoulder": ((0, 0, 1), low), "ledge": ((0, 0, 1), h / 2)}
-    return turned(outer, inner, flats={0: "end", low: "shoulder", h / 2: "ledge"}), volume, walls, flats
+    return revolve(outer, inner, flats={0: "end", low: "shoulder", h / 2: "ledge"}), volume, walls, flats
 
 
 def random_slotted(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
@@ -196,7 +196,7 @@ def test_the_mesh_of_the_pieces_agrees_with_centroid_and_inertia():
 
 def test_moments_of_arcs_are_those_of_many_corners():
     for outline in (
-        rounded(polygon((0, 0), (40, 0), (40, 20), (25, 20), (25, 50), (0, 50)), 4.0),
+        round_corners(polygon((0, 0), (40, 0), (40, 20), (25, 20), (25, 50), (0, 50)), 4.0),
         slot(30, 8, (5, -7)),
         [Edge((10, 0), center=(0, 0)), Edge((0, 10), center=(0, 0)), Edge((-10, 0)), Edge((0, -4))],
     ):
@@ -213,6 +213,6 @@ def test_moments_of_arcs_are_those_of_many_corners():
 
 
 def test_there_are_few_pieces():
-    assert len(extrude(rounded(rectangle(40, 30), 5), 0, 10).pieces) == 1
+    assert len(extrude(round_corners(rectangle(40, 30), 5), 0, 10).pieces) == 1
     assert len(extrude(rectangle(40, 30), 0, 10, holes=[rectangle(10, 10)]).pieces) <= 5
     assert len(extrude(rectangle(40, 30), 0, 9, bores=[bore((0, 0), 4, 0, 9, sides=8)]).pieces) <= 12

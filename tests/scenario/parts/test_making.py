@@ -20,11 +20,11 @@ from apo_bench.scenario.parts.making import (
     join,
     polygon,
     rectangle,
-    rounded,
+    revolve,
+    round_corners,
     shaft,
     slot,
     solid_of,
-    turned,
     write_part,
 )
 
@@ -49,7 +49,7 @@ def base() -> Body:
 
 def bush() -> Body:
     outer = [Frustum(0, 3, 9, name="flange"), Frustum(3, 20, 7, name="outer")]
-    return turned(outer, [Frustum(0, 20, 5, name="inner", fit=True)], flats={0: "low", 3: "shoulder", 20: "high"})
+    return revolve(outer, [Frustum(0, 20, 5, name="inner", fit=True)], flats={0: "low", 3: "shoulder", 20: "high"})
 
 
 def pins() -> Body:
@@ -65,9 +65,9 @@ BODIES: Mapping[str, Body] = {
     "bush": bush(),
     "pins": pins(),
     "peg": shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
-    "bracket": extrude(rounded(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
+    "bracket": extrude(round_corners(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
     "dovetail": extrude(polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40),
-    "taper": turned([Frustum(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
+    "taper": revolve([Frustum(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
     "stairs": join(extrude(rectangle(60, 40), 0, 10, top="tread"), extrude(rectangle(20, 40, (-20, 0)), 10, 30)),
 }
 

@@ -11,7 +11,7 @@ from apo_bench.benchmark.report.page.page import Section, page
 from apo_bench.benchmark.report.tables.table import Column, Table, fill
 from apo_bench.benchmark.report.trials import NUMBERS
 from apo_bench.errors import InputError
-from apo_bench.io import check_folders, write_file
+from apo_bench.io import write_file
 
 _AGREEMENT = (
     "The same trials in both: how often success is the same, with Wilson's interval, and how often stage and code of "
@@ -32,7 +32,7 @@ _WHERE = (
     Column("scenario", "scenario", "place.scenario", words=True),
     Column("conditions", "conditions", "place.conditions", words=True),
     Column("method", "method", "place.method", words=True),
-    Column("noise_level", "noise_level", "place.level_words", words=True),
+    Column("noise_mm", "noise level", "place.noise_words", words=True),
 )
 
 
@@ -142,7 +142,6 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
     html = page(" against ".join(names), in_words(comparison), folders, sections)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        check_folders([folder])
         for name, table in tables.items():
             table.write(folder / f"{name}.csv")
         write_file(folder / "compare.html", html)

@@ -40,7 +40,7 @@ def figures(
     max_reobservations = Axes("looks allowed after the first", "success", "percent")
     gap = ("Gap of the contacts as seen and as planned", _gaps(settings, gaps), Axes(level, "gap [mm]", "log"))
     lines = {
-        "success_over_level": ("Success over level", _over_level(by_setting), Axes(level, "success", "percent")),
+        "success_over_noise_level": ("Success over level", _over_level(by_setting), Axes(level, "success", "percent")),
         "success_over_tightness": ("Success over tightness", _over_tightness(cells), tightness),
         "success_over_looks": ("Success over the number of looks", _over_looks(cells), max_reobservations),
         "gap_before_and_after": gap,
@@ -106,8 +106,8 @@ def _recognised(lines: Sequence[Line]) -> list[Mark]:
         Mark(
             f"{what}; {line['noise']}, carelessness {line['human_error_scale']:g}",
             line["contact_source"],
-            (line["noise_level"], line["noise_deg"]),
-            noise_label(line["noise_level"], line["noise_deg"], line["noise"]),
+            (line["noise_mm"], line["noise_deg"]),
+            noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
             *[line[what]] * 3,
         )
         for line in [line for line in lines if line["scenario"] == ALL] or lines

@@ -38,8 +38,8 @@ def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Sectio
     script = _file("page.js")
     known = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
-        f"default-src 'uncorrected'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
-        "base-uri 'uncorrected'; form-action 'uncorrected'"
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
+        "base-uri 'none'; form-action 'none'"
     )
     html = _template().render(
         title=title,

@@ -63,7 +63,7 @@ def report_page(c: Contents) -> str:
     by_setting = members(settings(c.cells), c.cells)
     matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
-    over = ("success_over_level", "success_over_tightness", "success_over_looks")
+    over = ("success_over_noise_level", "success_over_tightness", "success_over_looks")
     sections = [
         Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)]),
         Section("levels", "Success over level", [("text", _BANDS), *_shown(c, over, "half_levels")]),

@@ -34,13 +34,13 @@ def gap_table(lines: Sequence[Line]) -> Table:
 
 def felt_table(lines: Sequence[Line]) -> Table:
     """One line per cell of a robot that feels."""
-    heads = {"drawn": "drawn with", "stated": "stated", "felt": "felt", "sure": "sure to"}
+    heads = {"drawn": "drawn with", "stated": "stated", "estimated": "estimated", "sure": "sure to"}
     return Table(
         lines,
         (
             *place_columns(),
             Column("trials", "n"),
-            Column("probe_contacts", "probe_contacts", text="{touches:.1f}"),
+            Column("probe_contacts", "probe_contacts", text="{probe_contacts:.1f}"),
             Column("refused", "refused"),
             *(
                 Column(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
@@ -66,8 +66,8 @@ def effort_table(lines: Sequence[Line]) -> Table:
             *_METHOD,
             Column("trials", "right"),
             Column("extra_operations", "extra operations", text="{extra_operations:.1f}"),
-            Column("sim_time_s", "simulated", text="{sim_seconds:.0f} s"),
-            Column("displaced_mm", "pushed at most", text="{pushed_mm:.2f} mm"),
+            Column("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
+            Column("displaced_mm", "pushed at most", text="{displaced_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
@@ -173,13 +173,13 @@ def recognition_table(lines: Sequence[Line]) -> Table:
             Column("pose_source", "pose_source", words=True),
             Column("contact_source", "contact_source", words=True),
             Column("human_error_scale", "human_error_scale", words=True),
-            Column("noise_mm", "level [mm]", "noise_level", words=True),
-            Column("noise_deg", "level [deg]", words=True),
+            Column("noise_mm", "noise [mm]", words=True),
+            Column("noise_deg", "noise [deg]", words=True),
             Column("demonstrations"),
-            Column("complete", "all right", text="{complete} of {demonstrations}"),
-            Column("rate", "rate", "all_right.rate", "{all_right.rate:percent}"),
-            Column("", "95 % interval", "all_right.interval", "{all_right.interval:percents}"),
-            *interval_columns("all_right.interval"),
+            Column("complete", "all right", "complete.successes", "{complete.successes} of {demonstrations}"),
+            Column("rate", "rate", "complete.rate", "{complete.rate:percent}"),
+            Column("", "95 % interval", "complete.interval", "{complete.interval:percents}"),
+            *interval_columns("complete.interval"),
             Column("right"),
             Column("missed", "missed"),
             Column("false", "false"),

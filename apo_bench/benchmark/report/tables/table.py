@@ -183,13 +183,13 @@ def place_columns(path: str = "place", levels: bool = True) -> tuple[Column, ...
             for name in ("clearance_mm", "noise", "contact_source", "human_error_scale")
         ),
         *(
-            (Column("noise_mm", value=f"{path}.level"), Column("noise_deg", value=f"{path}.level_deg"))
+            (Column("noise_mm", value=f"{path}.noise_mm"), Column("noise_deg", value=f"{path}.noise_deg"))
             if levels
             else ()
         ),
         Column("method", "method", f"{path}.method", words=True),
         *(Column(name, value=f"{path}.{name}") for name in last),
-        *([Column("", "noise_level", f"{path}.level_words")] * levels),
+        *([Column("", "noise level", f"{path}.noise_words")] * levels),
     )
 
 

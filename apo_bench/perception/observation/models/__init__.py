@@ -1,17 +1,15 @@
 """Noise models, one a file: what a camera makes of the true poses."""
 
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import floored, with_shared
+from apo_bench.perception.observation.models.displacement import floor_covariance, with_shared
 from apo_bench.perception.observation.models.empirical import Empirical, empirical_noise
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.failures import CameraFailures
 from apo_bench.perception.observation.models.fitted import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
-    ConstantError,
     Fitted,
     MeasuredNoise,
-    ViewNoise,
 )
 from apo_bench.perception.observation.models.isotropic import HeavyTailed, Isotropic, PerPart
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, Outliers, last_seen
@@ -32,7 +30,6 @@ __all__ = (
     "Bias",
     "Camera",
     "CameraFailures",
-    "ConstantError",
     "Empirical",
     "Facts",
     "Fitted",
@@ -47,9 +44,8 @@ __all__ = (
     "Split",
     "Symmetric",
     "Tail",
-    "ViewNoise",
     "empirical_noise",
-    "floored",
+    "floor_covariance",
     "last_seen",
     "log_density_across",
     "log_density_along",

@@ -138,8 +138,7 @@ def read_residuals(path: str | Path) -> Sample:
     errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
     for row in read_csv(path, columns, _COLUMNS):
         kind = row.text("kind")
-        if kind not in _KINDS:
-            row.fail("kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
+        row.require(kind in _KINDS, "kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
         errors[kind].append([] if kind == _MISSED else _error(row))
     count = {kind: len(estimates) for kind, estimates in errors.items()}
     estimates = sum(count.values()) - count[_MISSED]

@@ -15,7 +15,7 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, measured_ra
 from apo_bench.errors import require
 from apo_bench.geometry import Array, approximate_symmetries, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 RATE = 0.3

@@ -3,18 +3,17 @@
 It is drawn, or stated of an observation that a camera of this noise has made.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple, final
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails, measured_rates
+from apo_bench.assembly import Assembly, Demonstration, Observation, Tails, measured_rates
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import displaced, floored, observe_displaced, with_shared
+from apo_bench.perception.observation.models.displacement import displace, floor_covariance, observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.perception.observation.models.tails import Split
@@ -30,24 +29,6 @@ _AS_MEASURED = NoiseLevel(1.0, 1.0)
 LARGEST_M = 0.4
 LARGEST_RAD = 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
-
-
-class ViewNoise(NamedTuple):
-    """Standard deviations per axis of an error of the whole view, one for each demonstration."""
-
-    shift_mm: float
-    turn_deg: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ConstantError:
-    """A displacement of everything that a camera sees, T_seen = P exp(c) P^-1 T, always the same."""
-
-    twist: Array
-    """(6,), c, [m, rad]."""
-    frame: Array
-    """(4, 4), P, world, [m]."""
 
 
 @final
@@ -67,10 +48,6 @@ class MeasuredNoise:
     """Part of those that were found, that are off by more than the limit of the shift."""
     farthest_mm: float
     """Outliers are off by the limit to this, alike in each octave."""
-    view: ViewNoise | None = None
-    """What all operations of a demonstration share."""
-    constant: ConstantError | None = None
-    """What stays from demonstration to demonstration; it is not drawn, since it can be taken out."""
 
 
 @final
@@ -125,37 +102,18 @@ class Fitted:
         tails = (
             stated_tails(measured, self.noise_level, self.camera, seen.poses) if min(self.noise_level) > 0.0 else None
         )
-        seen = replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
-        return seen if measured.view is None else self._displaced(seen, rng.standard_normal(6))
-
-    def _displaced(self, seen: Observation, unit: Array) -> Observation:
-        """What is seen if the whole view is off as well."""
-        sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.noise_level, 3)
-        if not sigma.any() or not len(seen.poses):
-            return seen
-        # E = P exp(e) P^-1 displaces all that is seen alike, about the middle of it.
-        P = view_frame(self.camera, [seen.poses])
-        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.poses
-        return with_shared(replace(seen, poses=goals), view_error(self.camera, goals, sigma))
+        return replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
 
 
-def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
-    """What was seen, a constant error of the camera taken out, with the covariances of measured noise.
+def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
+    """Return an observation with the covariances of measured noise in place of its own.
 
-    Covariances that it stated itself are not looked at, but for those of operations that were not seen.
+    Operations that were not observed keep their covariance.
     """
-    goals = np.array(observation.poses)
-    if measured.constant is not None:
-        # T_seen = P exp(c) P^-1 T, so T = P exp(-c) P^-1 T_seen.
-        P = measured.constant.frame
-        goals = P @ pose.exp(-measured.constant.twist) @ pose.inverse(P) @ goals
-    stated = floored(camera.covariance(goals, Fitted(measured, _AS_MEASURED, camera).covariance))
+    stated = floor_covariance(camera.covariance(observation.poses, Fitted(measured, _AS_MEASURED, camera).covariance))
     stated = np.where(observation.observed[:, None, None], stated, observation.covariance)
-    tails = stated_tails(measured, _AS_MEASURED, camera, goals)
-    seen = replace(observation, poses=goals, covariance=stated, shared=(), tails=tails)
-    if measured.view is None or not any(measured.view) or not len(goals):
-        return seen
-    return with_shared(seen, view_error(camera, goals, np.repeat(measured.view, 3) * LEVEL_UNITS))
+    tails = stated_tails(measured, _AS_MEASURED, camera, observation.poses)
+    return replace(observation, covariance=stated, shared=(), tails=tails)
 
 
 def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, goals: Array) -> Tails:
@@ -171,18 +129,6 @@ def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camer
         variances=np.array([*shift.variances, *turn.variances]) * units**2,
         limits=np.array([shift.limit, turn.limit]) * units[[0, 2]],
     )
-
-
-def view_error(camera: Camera, goals: Array, sigma: Array) -> SharedError:
-    """An error of the whole view with standard deviations (6,), about the middle of what is seen, [m, rad]."""
-    return SharedError("camera", tuple(range(len(goals))), np.diag(sigma**2), view_frame(camera, [goals]))
-
-
-def view_frame(camera: Camera, goals: Sequence[Array]) -> Array:
-    """The axes of a camera in the middle of all goals, (4, 4), world, [m]."""
-    P = camera.T_world_camera.copy()
-    P[:3, 3] = np.concatenate([T[:, :3, 3] for T in goals]).mean(axis=0)
-    return P
 
 
 def check_measured_level(noise_level: NoiseLevel, covariance: Array) -> None:
@@ -220,7 +166,7 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)
     xi = camera.twists(demonstration.poses, errors * scale)
-    stated = camera.covariance(displaced(demonstration.poses, xi), covariance * np.outer(scale, scale))
+    stated = camera.covariance(displace(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(noise_level) > 0.0)
     goals = seen.poses.copy()

@@ -7,7 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Tails
-from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 LEAST_FACTOR = 0.3

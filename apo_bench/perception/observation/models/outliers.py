@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
 from apo_bench.geometry import Array, frozen
-from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OUTLIERS = 0.1

@@ -8,9 +8,8 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displaced import observe_displaced, observe_shared
+from apo_bench.perception.observation.models.displacement import observe_displaced, observe_shared
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
-from apo_bench.perception.observation.models.fitted import view_error, view_frame
 
 OWN = 1.0 / 20.0
 """What operations that share an error err by themselves, as part of the level."""
@@ -83,10 +82,11 @@ class BiasView:
         own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
         if not len(assembly):
             return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
-        view = pose.adjoint(pose.inverse(demonstration.poses) @ view_frame(self.camera, [demonstration.poses]))
+        view = pose.adjoint(pose.inverse(demonstration.poses) @ _view_frame(self.camera, demonstration.poses))
 
         def shared(goals: Array) -> list[SharedError]:
-            return [view_error(self.camera, goals, sigma)]
+            every = tuple(range(len(goals)))
+            return [SharedError("camera", every, np.diag(sigma**2), _view_frame(self.camera, goals))]
 
         return observe_shared(assembly, demonstration, view @ (unit * sigma) + own, OWN * sigma, shared)
 
@@ -131,3 +131,10 @@ class Correlated:
             return [SharedError("drift", every, np.diag(sigma**2), T, local=True, correlation=between)]
 
         return observe_shared(assembly, demonstration, xi, OWN * sigma, shared)
+
+
+def _view_frame(camera: Camera, goals: Array) -> Array:
+    """Return the axes of a camera in the middle of poses (n, 4, 4), as (4, 4), world, [m]."""
+    P = camera.T_world_camera.copy()
+    P[:3, 3] = goals[:, :3, 3].mean(axis=0)
+    return P

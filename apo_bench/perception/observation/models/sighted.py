@@ -14,7 +14,7 @@ from apo_bench.perception.observation.models.camera import (
     WORKSPACE_MIDDLE_M,
     Camera,
 )
-from apo_bench.perception.observation.models.displaced import displaced, observe_displaced
+from apo_bench.perception.observation.models.displacement import displace, observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 ALONG_SIGHT = 3.0
@@ -114,7 +114,7 @@ class Sighted:
         rad = np.radians(self.noise_level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
         xi = self.camera.twists(demonstration.poses, rng.standard_normal((len(assembly), 6)) * sigma)
-        stated = self.camera.covariance(displaced(demonstration.poses, xi), np.diag(sigma**2))
+        stated = self.camera.covariance(displace(demonstration.poses, xi), np.diag(sigma**2))
         return observe_displaced(assembly, demonstration, xi, stated)
 
 

@@ -17,7 +17,7 @@ from apo_bench.geometry import (
     symmetries,
     turn_about,
 )
-from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 WORSE = 3.0

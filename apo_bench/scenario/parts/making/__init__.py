@@ -3,8 +3,8 @@
 from apo_bench.scenario.parts.making.body import Body, join
 from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude
 from apo_bench.scenario.parts.making.frustums import Frustum
-from apo_bench.scenario.parts.making.outline import Edge, Outline, circle, polygon, rectangle, rounded, slot
-from apo_bench.scenario.parts.making.turned import shaft, turned
+from apo_bench.scenario.parts.making.outline import Edge, Outline, circle, polygon, rectangle, round_corners, slot
+from apo_bench.scenario.parts.making.revolve import revolve, shaft
 from apo_bench.scenario.parts.making.writing import quoted, solid_of, write_part
 
 __all__ = [
@@ -20,10 +20,10 @@ __all__ = [
     "polygon",
     "quoted",
     "rectangle",
-    "rounded",
+    "revolve",
+    "round_corners",
     "shaft",
     "slot",
     "solid_of",
-    "turned",
     "write_part",
 ]

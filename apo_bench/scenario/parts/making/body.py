@@ -16,9 +16,9 @@ from apo_bench.geometry import (
     flat_area,
     polygons_of,
     rings_of,
-    straightened,
+    straighten,
 )
-from apo_bench.scenario.parts.making.moments import Moments, summed
+from apo_bench.scenario.parts.making.moments import Moments, sum_moments
 
 _SAME_M = 1e-9
 _PARALLEL = 1e-12
@@ -93,7 +93,7 @@ def join(*bodies: Body) -> Body:
         tuple(piece for body in bodies for piece in body.pieces),
         tuple(_joined_flats(flats)),
         tuple(_joined_rounds(rounds)),
-        summed(bodies[0].moments, (body.moments for body in bodies[1:])),
+        sum_moments(bodies[0].moments, (body.moments for body in bodies[1:])),
     )
 
 
@@ -146,7 +146,7 @@ def _plane(n: Array) -> Array:
 
 
 def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
-    flat = [straightened(ring) for ring in rings_of(polygon, sign)]
+    flat = [straighten(ring) for ring in rings_of(polygon, sign)]
     outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
     return Face(name, outline, tuple(holes), fit)
 

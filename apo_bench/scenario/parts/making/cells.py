@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Point, Polygon, box, unary_union
 
-from apo_bench.geometry import Array, polygons_of, rings_of, straightened
+from apo_bench.geometry import Array, polygons_of, rings_of, straighten
 
 _SAME_MM = 1e-6
 _ON_MM = 1e-9
@@ -18,7 +18,7 @@ _REACHES = (2.0, 1.6, 1.35, 1.2, 1.1, 1.05, 1.02)
 """How far the cell of a bore reaches, in radii; the first one that there is room for."""
 
 
-def convex_cells(area: Any) -> list[Array]:
+def cut_convex(area: Any) -> list[Array]:
     """The convex areas, (k, 2) each, counter-clockwise, that a shapely area is cut into.
 
     Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
@@ -30,7 +30,7 @@ def convex_cells(area: Any) -> list[Array]:
 def _cut(polygon: Any) -> list[Array]:
     from manifold3d import triangulate
 
-    rings = [straightened(ring) for ring in rings_of(polygon, 1.0)]
+    rings = [straighten(ring) for ring in rings_of(polygon, 1.0)]
     if len(rings) == 1 and is_convex(rings[0]):
         return rings
     points = np.concatenate(rings)
@@ -46,7 +46,7 @@ def _cut(polygon: Any) -> list[Array]:
             for edge in zip(joined, [*joined[1:], joined[0]], strict=True):
                 owner[edge] = i
             del cells[k]
-    return [straightened(points[cell]) for cell in cells.values() if _is_wide(points[cell])]
+    return [straighten(points[cell]) for cell in cells.values() if _is_wide(points[cell])]
 
 
 def _is_wide(ring: Array) -> bool:
@@ -71,7 +71,7 @@ def is_convex(ring: Array) -> bool:
     return bool((across > -_SAME_MM * np.linalg.norm(into, axis=1)).all())
 
 
-def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, float]]) -> Array | None:
+def find_bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, float]]) -> Array | None:
     """A convex area around a bore inside of the free one, counter-clockwise; None if there is no room for one.
 
     Args:
@@ -83,17 +83,17 @@ def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, flo
         for middle, r in others:
             gap = np.linalg.norm(middle - at)
             n = (middle - at) / gap
-            square = clipped(square, n, float(n @ at + (gap + radius - r) / 2.0))
+            square = clip(square, n, float(n @ at + (gap + radius - r) / 2.0))
         cell = Polygon(square).intersection(free)
         if cell.geom_type != "Polygon" or cell.interiors:
             continue
-        corners = straightened(rings_of(cell, 1.0)[0])
+        corners = straighten(rings_of(cell, 1.0)[0])
         if is_convex(corners) and cell.contains(Point(at)) and cell.exterior.distance(Point(at)) > radius + _SAME_MM:
             return corners
     return None
 
 
-def clipped(ring: Array, n: Array, d: float) -> Array:
+def clip(ring: Array, n: Array, d: float) -> Array:
     """What of a convex area has n . x <= d; (0, 2) if nothing has."""
     kept: list[tuple[float, float]] = []
     heights = (ring @ n - d).tolist()
@@ -111,19 +111,19 @@ def clipped(ring: Array, n: Array, d: float) -> Array:
     return np.array(kept, dtype=np.float64).reshape(-1, 2)
 
 
-def wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
+def cut_wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
     """A convex area around a point cut into sectors: the middle direction of each, (2,), and its area, (k, 2)."""
     sectors = []
     for i in range(sides):
         a, b, m = (2.0 * np.pi * (i + off) / sides for off in (-0.5, 0.5, 0.0))
         right = np.array([np.sin(a), -np.cos(a)])
         left = np.array([-np.sin(b), np.cos(b)])
-        area = clipped(clipped(cell, right, float(right @ at)), left, float(left @ at))
+        area = clip(clip(cell, right, float(right @ at)), left, float(left @ at))
         sectors.append((np.array([np.cos(m), np.sin(m)]), area))
     return sectors
 
 
-def bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array]:
+def cut_bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array]:
     """Convex areas, (4, 2) each, behind the sides of rings that recede; none where there is no room for them.
 
     Args:

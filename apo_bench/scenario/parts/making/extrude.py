@@ -9,20 +9,20 @@ import numpy as np
 from shapely import Polygon, unary_union
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
+from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straighten
 from apo_bench.scenario.parts.making.body import Body
-from apo_bench.scenario.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
+from apo_bench.scenario.parts.making.cells import clip, cut_bands, cut_convex, cut_wedges, find_bore_cell
 from apo_bench.scenario.parts.making.frustums import (
     Frustum,
     at_height,
-    chamfered,
+    chamfer,
+    circumscribe_polygon,
     heights_of,
     prism,
-    raised,
-    tangent,
-    without,
+    raise_to,
+    subtract_steps,
 )
-from apo_bench.scenario.parts.making.moments import extruded, summed
+from apo_bench.scenario.parts.making.moments import extrude_moments, sum_moments
 from apo_bench.scenario.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3
@@ -63,7 +63,7 @@ def bore(
     The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
     """
     wall = Frustum(low, high, radius, name=name, fit=fit, sides=sides)
-    return Bore(at, tuple(chamfered(wall, chamfer_low, chamfer_high, 1.0)))
+    return Bore(at, tuple(chamfer(wall, chamfer_low, chamfer_high, 1.0)))
 
 
 @check_arguments
@@ -91,7 +91,7 @@ def extrude(
         ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
     """
     area = Polygon(ring(outline), [ring(hole, hole=True) for hole in holes])
-    discs = [Polygon(tangent(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
+    discs = [Polygon(circumscribe_polygon(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
     apart = all(not a.intersects(b) for a, b in combinations(discs, 2))
     if not area.is_valid or area.area <= 0.0 or not apart or not all(area.contains(disc) for disc in discs):
         raise ValueError("an outline with holes and bores inside of it, none of which meet, is needed")
@@ -104,10 +104,10 @@ def extrude(
         return extrude(outline, low, high, holes=[*holes, hole], bores=others, bottom=bottom, top=top, fit=fit)
     for cell in cells:
         rest = rest.difference(Polygon(cell))
-    prisms = [prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
-    moments = extruded(summed(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
+    prisms = [prism(cell, low, high) for cell in (*beside, *cut_convex(rest))]
+    moments = extrude_moments(sum_moments(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
     for each in bores:
-        moments = without(moments, each.steps, each.at)
+        moments = subtract_steps(moments, each.steps, each.at)
     pieces = [*prisms, *(piece for b, cell in zip(bores, cells, strict=True) for piece in _bored(b, cell, low, high))]
     sides = [_sides(outline, low, high, False), *(_sides(hole, low, high, True) for hole in holes)]
     flats = [flat for own, _ in sides for flat in own]
@@ -129,7 +129,7 @@ def _bands(area: Any, outline: Outline, holes: Sequence[Outline]) -> list[Array]
     for hole in filter(_round_fit, holes):
         fit = receding(hole, hole=True)
         rings.append((ring(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
-    return bands(area, rings)
+    return cut_bands(area, rings)
 
 
 def _round_fit(outline: Outline) -> bool:
@@ -150,7 +150,7 @@ def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
     cells: list[Array] = []
     for i, each in enumerate(bores):
         others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]
-        cell = bore_cell(area, np.array(each.at), each.widest, others)
+        cell = find_bore_cell(area, np.array(each.at), each.widest, others)
         if cell is None:
             break
         area = area.difference(Polygon(cell))
@@ -169,9 +169,9 @@ def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
             continue
         r_a = step.at(a)
         r_b = step.at(b)
-        for n, area in wedges(cell, at, step.count):
-            ends = [clipped(area, -n, -float(n @ at) - r) for r in (r_a, r_b)]
-            yield np.concatenate([raised(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
+        for n, area in cut_wedges(cell, at, step.count):
+            ends = [clip(area, -n, -float(n @ at) - r) for r in (r_a, r_b)]
+            yield np.concatenate([raise_to(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
 
 
 def _each_once(flat: Array) -> Array:
@@ -227,7 +227,7 @@ def _ends(
     fit: Sequence[str],
 ) -> Iterator[Face]:
     for z, name, above in ((low, bottom, True), (high, top, False)):
-        openings = [tangent(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
+        openings = [circumscribe_polygon(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
         inner = [*(ring(hole, hole=True) for hole in holes), *openings]
         yield flat_face(name, ring(outline), inner, z, up=not above, fit=name in fit and bool(name))
 
@@ -242,12 +242,12 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
         name = (each.flats or {}).get(z, "")
         wide, slim = (above, below) if above[0] > below[0] else (below, above)
         if wide[0] - slim[0] > _NARROW_MM:
-            hole = [tangent(each.at, *slim)] if slim[1] else []
-            yield flat_face(name, tangent(each.at, *wide), hole, z, up=above[0] > below[0])
+            hole = [circumscribe_polygon(each.at, *slim)] if slim[1] else []
+            yield flat_face(name, circumscribe_polygon(each.at, *wide), hole, z, up=above[0] > below[0])
 
 
 def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
     """A level face from rings in mm, all counter-clockwise, that looks up or down."""
-    turned = [1e-3 * raised(straightened(each), z) for each in (outline, *holes)]
+    turned = [1e-3 * raise_to(straighten(each), z) for each in (outline, *holes)]
     outside, *inside = turned if up else [each[::-1] for each in turned]
     return Face(name, outside, tuple(hole[::-1] for hole in inside), fit)

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.scenario.parts.making.moments import Moments, frustum_moments, summed
+from apo_bench.scenario.parts.making.moments import Moments, frustum_moments, sum_moments
 from apo_bench.scenario.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6
@@ -61,7 +61,7 @@ class Frustum:
         return RoundFace(self.name, point, np.array([0.0, 0.0, 1.0]), span, (1e-3 * a, 1e-3 * b), hole, self.fit)
 
 
-def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
+def chamfer(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
     """A cylinder with chamfers of 45 degrees in its length, [mm]; those of `name` are `name_chamfer_low` and `.._high`.
 
     Args:
@@ -81,20 +81,20 @@ def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list
     return steps
 
 
-def without(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
+def subtract_steps(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
     """What is left of moments without those of some lengths about an axis along z."""
     there = np.array([*at, 0.0])
-    return summed(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
+    return sum_moments(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
 
 
-def raised(flat: Array, z: float) -> Array:
+def raise_to(flat: Array, z: float) -> Array:
     """Points of a plane, (k, 2), at a height, (k, 3)."""
     return np.column_stack([flat, np.full(len(flat), z)])
 
 
 def prism(flat: Array, low: float, high: float) -> Array:
     """The corners, (2 k, 3), of a prism over points of a plane, (k, 2)."""
-    return np.concatenate([raised(flat, low), raised(flat, high)])
+    return np.concatenate([raise_to(flat, low), raise_to(flat, high)])
 
 
 def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
@@ -113,12 +113,12 @@ def heights_of(steps: Sequence[Frustum], *more: float) -> list[float]:
     return [float(h) for h in every[np.diff(every, prepend=-np.inf) > _SAME_MM]]
 
 
-def tangent(at: tuple[float, float], radius: float, sides: int) -> Array:
+def circumscribe_polygon(at: tuple[float, float], radius: float, sides: int) -> Array:
     """A polygon, (k, 2), counter-clockwise, whose sides touch a circle from outside."""
-    return inscribed(at, radius / np.cos(np.pi / sides), sides)
+    return inscribe_polygon(at, radius / np.cos(np.pi / sides), sides)
 
 
-def inscribed(at: tuple[float, float], radius: float, sides: int) -> Array:
+def inscribe_polygon(at: tuple[float, float], radius: float, sides: int) -> Array:
     """A polygon, (k, 2), counter-clockwise, whose corners lie on a circle; no corner, but a side lies towards +x."""
     angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     return np.asarray(np.array(at) + radius * np.column_stack([np.cos(angle), np.sin(angle)]))

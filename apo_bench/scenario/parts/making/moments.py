@@ -43,7 +43,7 @@ class Moments(NamedTuple):
         return np.asarray(np.trace(S) * np.eye(3) - S)
 
 
-def summed(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
+def sum_moments(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
     """Those of one shape and of others, or less others, one after the other."""
     return reduce(lambda moments, other: moments.plus(other, sign), others, first)
 
@@ -81,7 +81,7 @@ def segment_moments(center: Array, radius: float, middle: float, extent: float) 
     return sector.plus(chord, -1.0).moved(R, center)
 
 
-def extruded(flat: Moments, low: float, high: float) -> Moments:
+def extrude_moments(flat: Moments, low: float, high: float) -> Moments:
     """Of the prism over a flat shape, from one height to another one."""
     h = high - low
     z1 = (high**2 - low**2) / 2.0

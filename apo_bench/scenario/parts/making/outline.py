@@ -109,7 +109,9 @@ def slot(
 
 
 @check_arguments
-def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None) -> Outline:
+def round_corners(
+    outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None
+) -> Outline:
     """An outline of straight sides with corners, else all, rounded."""
     edges: list[Edge] = []
     points = np.array([edge.start for edge in outline])

@@ -1,1 +1,1 @@
-"""What a robot does besides to know where it is: it squares, touches, lays flat, and believes."""
+"""The robot probes fixed surfaces and held parts to estimate its calibration."""

@@ -1,6 +1,6 @@
 """Where the closed, empty hand can touch what is fixed: three places of the floor around the goals, and walls.
 
-Known from the plan alone: believed poses of what stands, and shapes.
+Known from the plan alone: estimated poses of what stands, and shapes.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,10 +12,11 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.simulation.execution.beside import NOISE_LEVEL, STAND_OFF_M, upright_walls
+from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M, upright_walls
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import Obstacle, gripper_boxes, shifted
+from apo_bench.simulation.robot import Obstacle, gripper_boxes, translate
 from apo_bench.simulation.scene import Scene
 
 OPENING_M = 0.004
@@ -37,7 +38,7 @@ _LOOKS_M = 0.004
 
 
 StandOff = Callable[[Array, Array], float]
-"""How far before a face a touch shall begin, [m], by the pose of the tip there, (4, 4), and the normal of the face."""
+"""How far before a face a touch begins, [m], by the pose of the tip there, (4, 4), and the normal of the face."""
 
 
 class TouchPlace(NamedTuple):
@@ -84,7 +85,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
         touched = np.array([x, y, (d - n[0] * x - n[1] * y) / n[2]])
         there = frame(rest, touched - rest @ point)
         away = stand_off(there, n)
-        begins = shifted(there, n, away)
+        begins = translate(there, n, away)
         if not own_shape(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
             return None
         return TouchPlace(begins, -n, patch, n, d, away) if _free(scene, begins, around) else None
@@ -104,7 +105,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
 
 
 def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
-    """One place on each wall of what is fixed that tells where something will be fitted in."""
+    """One place on each wall of what is fixed that locates a later fit."""
     ahead = np.array([0.0, 1.0])
     around = obstacles(plan.assembly.solids, plan.start, ())
     places = [
@@ -117,7 +118,7 @@ def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off)
 def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
     """One wall touched by either side of the fingers along which they close, the hand turned by half; none without.
 
-    There the fingers give way, on both sides alike: only the difference of the two tells something.
+    There the fingers give way, on both sides: only the difference of the two is used.
     """
     around = obstacles(plan.assembly.solids, plan.start, ())
     for part, face in upright_walls(plan.assembly, plan.start):
@@ -185,7 +186,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
     touched += (d - n @ touched) * n
     there = frame(R, touched - R @ patch.mean(axis=0))
     away = stand_off(there, n)
-    return TouchPlace(shifted(there, n, away), -n, patch, n, d, away)
+    return TouchPlace(translate(there, n, away), -n, patch, n, d, away)
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
@@ -206,5 +207,5 @@ def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
     lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
     if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
-    above = scene.kinematics.inverse(shifted(T, UP, _LIFT_M), np.array(scene.arm.home))
+    above = scene.kinematics.inverse(translate(T, UP, _LIFT_M), np.array(scene.arm.home))
     return above is not None and scene.kinematics.inverse(T, above) is not None

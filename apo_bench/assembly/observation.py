@@ -1,0 +1,75 @@
+"""What was observed of a demonstration: noisy poses with their stated covariances, all that a corrector may use."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.arguments import check_arguments
+from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.plan import Plan
+from apo_bench.assembly.poses import Poses, check_parts
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import ArgumentError, require
+from apo_bench.geometry import Array, copyable, freeze
+
+
+@final
+@check_arguments
+@copyable
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What was seen: all a corrector may use."""
+
+    assembly: Assembly
+    start: Poses
+    poses: Array
+    """(n, 4, 4)."""
+    covariance: Array
+    """(n, 6, 6), of the body twist by which each goal is wrong, [m, rad]."""
+    observed: NDArray[np.bool_]
+    """(n,): whether the operation was seen at all."""
+    gap_m: float = 1e-4
+    """Largest |e| at which the contact equations count as solved, [m]."""
+    play_m: float = 0.0
+    """How far from nominal a contact of parts that fit may really be: their clearance per side, [m]."""
+    outliers: OutlierModel | None = None
+    """How often observations of this kind are worse than they say; None if that is not known."""
+    shared: tuple[SharedError, ...] = ()
+    """What errors of operations have in common, all of it within `covariance`; none: they are independent."""
+    tails: Tails | None = None
+    """How errors are distributed; None: as a Gaussian's."""
+
+    def __post_init__(self) -> None:
+        n = len(self.assembly)
+        freeze(self, poses=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
+        check_parts(self.assembly, self.start)
+        object.__setattr__(self, "shared", tuple(self.shared))
+        for error in self.shared:
+            if max(error.operations, default=-1) >= n:
+                raise ArgumentError(
+                    f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}"
+                )
+        if self.tails is not None and len(self.tails.frames) != n:
+            raise ArgumentError(f"tails of {len(self.tails.frames)} operations were given for {n}")
+        observed = np.array(self.observed, dtype=np.bool_)
+        if observed.shape != (n,):
+            raise ArgumentError(f"`observed` needs shape ({n},), {observed.shape} was given")
+        observed.flags.writeable = False
+        object.__setattr__(self, "observed", observed)
+
+    def plan(self) -> Plan:
+        """What was seen, as it is: the plan of the method `uncorrected`.
+
+        Raises:
+            InputError: An operation was not seen.
+        """
+        require(
+            self.observed.all(),
+            f"operation {int(np.argmin(self.observed)) + 1} was not seen, so the observation cannot be replayed as is; "
+            "observe the demonstration again.",
+        )
+        return Plan(self.assembly, self.start, self.poses)

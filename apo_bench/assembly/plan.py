@@ -1,0 +1,99 @@
+"""What the robot is asked to do: target poses, and the order in which operations are done and undone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.arguments import check_arguments
+from apo_bench.assembly.poses import Poses, check_parts
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import Array, copyable, freeze
+
+SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
+
+
+class Step(NamedTuple):
+    """One entry of a schedule: do an operation (counted from 0), or undo it."""
+
+    operation: int
+    undo: bool = False
+
+
+def once_each(n: int) -> tuple[Step, ...]:
+    """The plain schedule: every operation once, in order."""
+    return tuple(Step(k) for k in range(n))
+
+
+@final
+@check_arguments
+@copyable
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What the robot is asked to do."""
+
+    assembly: Assembly
+    start: Poses
+    target_poses: Array
+    """(n, 4, 4): where every operation puts its main part in the end."""
+    schedule: tuple[Step, ...] = field(default=())
+    """Empty stands for: every operation once, in order."""
+    step_poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
+    that it undoes. Empty stands for: those of `target_poses`."""
+
+    def __post_init__(self) -> None:
+        n = len(self.assembly)
+        freeze(self, target_poses=(n, 4, 4), start=(4, 4))
+        check_parts(self.assembly, self.start)
+        if not self.schedule:
+            object.__setattr__(self, "schedule", once_each(n))
+        if not len(self.step_poses):
+            object.__setattr__(self, "step_poses", self.target_poses[[step.operation for step in self.schedule]])
+        freeze(self, step_poses=(len(self.schedule), 4, 4))
+
+    @check_arguments
+    def with_target_poses(self, poses: Array) -> "Plan":
+        """The plan with other target poses, (n, 4, 4), also in the steps that bring parts to the old ones."""
+        done = [step.operation for step in self.schedule]
+        # step poses that are not target poses are states in between, which stay where they are
+        final = (self.step_poses == self.target_poses[done]).all(axis=(1, 2))
+        return replace(
+            self, target_poses=poses, step_poses=np.where(final[:, None, None], poses[done], self.step_poses)
+        )
+
+
+def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
+    """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
+
+    What is done is always the first few operations: an operation may stand on all that came before it, and what was
+    undone last first leaves free the place that it came from.
+    """
+    done = 0
+    for k, undo in schedule:
+        faults = {
+            f"names operation {k + 1}, where {operations} are known": not 0 <= k < operations,
+            f"undoes operation {k + 1}, which is not done": undo and k >= done,
+            f"undoes operation {k + 1} before operation {done}, which came after it": undo and k < done - 1,
+            f"does operation {k + 1} again, which is done": not undo and k < done,
+            f"does operation {k + 1} before operation {done + 1}": not undo and k > done,
+        }
+        if any(faults.values()):
+            return next(fault for fault, is_one in faults.items() if is_one)
+        done += -1 if undo else 1
+    return f"leaves operation {done + 1} undone" if done < operations else ""
+
+
+def poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
+    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
+    goals = np.array(plan.target_poses)
+    done = 0
+    stages = []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
+        if not step.undo:
+            goals[step.operation] = target
+            done = step.operation + 1
+        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
+            stages.append((done, np.array(goals)))
+    return stages

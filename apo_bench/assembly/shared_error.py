@@ -1,0 +1,90 @@
+"""Errors that several operations share: a camera that is not where it is assumed, a model with a wrong origin.
+
+A shared error is a twist c with a covariance, in a stated frame. It takes the observed poses to the true ones: as the
+body twist of operation k it is A_k c, T_k = T_observed_k exp(A_k c), with
+
+    A_k = Ad(T_observed_k^-1 P)     in a frame P of the world, which holds for errors of any size,
+    A_k = Ad of a turn alone        in the axes of P, at the origin of each part (`local`),
+    A_k = 1                         in the frame of each part itself (no frame).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry import Array, copyable, freeze, pose
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class SharedError:
+    """A part of the errors of some operations that is the same in all of them, or correlated."""
+
+    name: str
+    """What is wrong: `camera`, or the name of a part."""
+    operations: tuple[int, ...]
+    """Those that share it, counted from 0."""
+    covariance: Array
+    """(6, 6), of the twist c, [m, rad]; a part of the covariance that each of these operations states."""
+    frame: Array | None = None
+    """(4, 4), P, world, [m]; none stands for the frame of each part."""
+    local: bool = False
+    """Whether only the axes of `frame` count, at the origin of each part."""
+    correlation: Array | None = None
+    """(m, m): between the twists of the m operations; none stands for one and the same twist."""
+
+    def __post_init__(self) -> None:
+        operations = tuple(int(k) for k in self.operations)
+        m = len(operations)
+        if m != len(set(operations)) or min(operations, default=0) < 0:
+            raise ValueError(f"each operation once, counted from 0, is needed, {operations} was given")
+        object.__setattr__(self, "operations", operations)
+        freeze(self, covariance=(6, 6), frame=(4, 4), correlation=(m, m))
+
+    def ways(self, goals: Array) -> Array:
+        """A_k of the operations that share it, (m, 6, 6); `goals` are those that were seen, (n, 4, 4)."""
+        seen = goals[list(self.operations)]
+        if self.frame is None:
+            return np.broadcast_to(np.eye(6), (len(seen), 6, 6))
+        back = pose.inverse(seen) @ self.frame
+        if self.local:
+            back[:, :3, 3] = 0.0
+        return pose.adjoint(back)
+
+    def added(self, goals: Array) -> Array:
+        """What it adds to the covariance of the body twists of the operations that share it, (m, 6, 6)."""
+        A = self.ways(goals)
+        C = A @ self.covariance @ np.swapaxes(A, 1, 2)
+        return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
+
+
+def joint_covariance(goals: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
+    """The covariance of the body twists of all operations together, (6 n, 6 n), [m, rad].
+
+    Args:
+        goals: (n, 4, 4), those that were seen.
+        covariance: (n, 6, 6), of each operation by itself.
+    """
+    n = len(goals)
+    joint = np.zeros((n, 6, n, 6))
+    six = np.arange(6)
+    for error in shared:
+        k = np.array(error.operations, dtype=np.intp)
+        A = error.ways(goals)
+        # The twists of operations k and l are A_k c and A_l c, so their covariance is A_k C A_l^t.
+        between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
+        if error.correlation is not None:
+            between *= error.correlation[:, None, :, None]
+        joint[np.ix_(k, six, k, six)] += between
+    joint[np.arange(n), :, np.arange(n)] = covariance
+    whole = joint.reshape(6 * n, 6 * n)
+    return np.asarray((whole + whole.T) / 2)
+
+
+def first_order(m: int, correlation: float) -> Array:
+    """The correlations of a first-order autoregression, (m, m)."""
+    steps = np.arange(m)
+    return np.asarray(correlation ** np.abs(steps[:, None] - steps))

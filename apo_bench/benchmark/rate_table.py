@@ -1,0 +1,107 @@
+"""The table that `evaluate` returns: success rates with intervals, and the records they are counted from."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import copyfile
+from tempfile import TemporaryDirectory
+from typing import Any, final
+
+from apo_bench.errors import missing_package, require
+from apo_bench.records import TrialRecord
+
+RUN_FILES = ("run.json", "trials.jsonl", "timing.jsonl")
+"""The files of a sweep's folder."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RateTable:
+    """Success rates of an evaluation, one row for each condition, with 95 % Wilson intervals.
+
+    `print(table)` shows the settings that differ, the rate and its interval.
+    """
+
+    records: tuple[TrialRecord, ...]
+    """The record of each trial, with methods by the labels that were given."""
+    folder: Path
+    """The folder with the records as `apo-bench sweep` writes them."""
+    _temporary: TemporaryDirectory[str] | None = None
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """One dict for each condition: its settings, `trials`, `successes`, `rate`, `low_95`, `high_95` and more."""
+        table = self._table()
+        named = [column for column in table.columns if column.name]
+        return [{column.name: column.of(item) for column in named} for item in table.items]
+
+    def __str__(self) -> str:
+        """The table as text with aligned columns."""
+        table = self._table()
+        return "\n".join(_align([[column.head for column in table.shown], *table.lines]))
+
+    def to_pandas(self) -> Any:
+        """The rows as a `pandas.DataFrame`.
+
+        Raises:
+            InputError: The package pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise missing_package("to_pandas", "pandas") from error
+        return pandas.DataFrame(self.rows)
+
+    def to_polars(self) -> Any:
+        """The rows as a `polars.DataFrame`.
+
+        Raises:
+            InputError: The package polars is not installed.
+        """
+        try:
+            import polars
+        except ImportError as error:
+            raise missing_package("to_polars", "polars") from error
+        return polars.DataFrame(self.rows)
+
+    def plot(self, path: str | Path) -> Path:
+        """Draw success over the noise level, a curve for each method, and write it as SVG or PNG by the ending.
+
+        Raises:
+            InputError: Another ending, or the file cannot be written.
+        """
+        from apo_bench.benchmark.analysis import settings, tally
+        from apo_bench.benchmark.report.figures.figures import figures
+
+        target = Path(path)
+        require(target.suffix in (".svg", ".png"), f"'{path}' was given; use a file name that ends in .svg or .png.")
+        cells = tally(self.records)
+        drawn = figures(cells, (), settings(cells), (), (), (), ())
+        return drawn["success_over_noise_level"].write(target)
+
+    def save(self, folder: str | Path) -> Path:
+        """Copy the records and the description of the run to a folder, for `apo-bench report` and `compare`.
+
+        Raises:
+            InputError: The folder holds a run already.
+        """
+        target = Path(folder)
+        require(not (target / RUN_FILES[1]).exists(), f"'{folder}' holds a run already; save to another folder.")
+        target.mkdir(parents=True, exist_ok=True)
+        for name in RUN_FILES:
+            if (self.folder / name).exists():
+                copyfile(self.folder / name, target / name)
+        return target
+
+    def _table(self) -> Any:
+        from apo_bench.benchmark.analysis import tally
+        from apo_bench.benchmark.report.tables.cells import cell_table
+
+        return cell_table(tally(self.records))
+
+
+def _align(lines: Sequence[Sequence[str]]) -> Iterable[str]:
+    """Lines of cells as text, in columns."""
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()

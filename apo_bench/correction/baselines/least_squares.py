@@ -1,0 +1,56 @@
+"""A baseline: soft contacts and a soft prior in one sum of squares, as a general solver takes them.
+
+The cost is  sum (e / CONTACT_M)^2 + sum |z_k|^2,  with e of every contact ever made and z_k = L_k^-1 xi_k, the twist
+of pose k in units of its stated covariance L_k L_k^t. It is minimised by `scipy.optimize.least_squares`: trust region
+reflective (Branch, Coleman and Li, 1999), analytic Jacobian, dense, begun at what was observed, until steps, cost or
+gradient are below 1e-12, or after `EVALUATIONS`. As contacts are soft they hold within about
+CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of operations: matrices are dense.
+"""
+
+import numpy as np
+
+from apo_bench.assembly import Correction, Observation
+from apo_bench.assembly.equations import equations
+from apo_bench.correction.checks.as_given import as_it_ends
+from apo_bench.correction.solvers.whitened import whitened
+from apo_bench.geometry import Array
+
+CONTACT_M = 1e-6
+"""Stated standard deviation of a contact, tuned."""
+_TOLERANCE = 1e-12
+EVALUATIONS = 300
+
+
+def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> Correction:
+    """The goals with the least sum of squares.
+
+    Args:
+        contact_m: Standard deviation of e, [m].
+
+    Returns:
+        `converged` with the gap that is left in the sentence, or `not_seen`; `not_finite` if a number overflowed.
+
+    Raises:
+        InputError: A covariance is not positive definite.
+    """
+    return as_it_ends(
+        observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
+    )
+
+
+def _solved(observation: Observation, contact_m: float) -> Array:
+    from scipy.optimize import least_squares as minimised
+
+    space = whitened(observation)
+    system = equations(observation.assembly, observation.start, observation.poses)
+    prior = np.eye(6 * len(observation.poses))
+
+    def residual(z: Array) -> Array:
+        return np.concatenate([system.residual(space.goals(z)) / contact_m, z])
+
+    def jacobian(z: Array) -> Array:
+        _, J = system.linearised(space.goals(z))
+        return np.concatenate([space.pulled(z, J) / contact_m, prior])
+
+    settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
+    return space.goals(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)

@@ -1,0 +1,91 @@
+"""Where a robot with unknown errors really goes: the forward model of its unknowns, with its derivative.
+
+    T_world_part = E B exp(J delta) shift(tau) exp(gamma) T_tip_part,  E = M exp(xi) M^-1
+
+B is where the robot assumes its tip, xi the displacement between hand and eye, a twist at the middle of the poses (M is
+the shift there), delta the zeros of the encoders, J the body Jacobian at B, tau the shift of the tool, and gamma how
+the part moved in the hand, a twist in the frame of the tip. The vector of unknowns is (xi, tau, delta, gamma of the
+first grasp, of the second, ..), [m, rad].
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.geometry import Array, Ints, exp_and_jacobian, pose
+
+HAND_EYE = slice(0, 6)
+TOOL = slice(6, 9)
+
+
+class Places(NamedTuple):
+    """t places of what a robot holds, or of its tip."""
+
+    T_world_tip: Array
+    """(t, 4, 4): B, [m]."""
+    jacobian: Array
+    """(t, 6, joints), [m/rad, rad/rad]; zeros: as if the encoders were exact."""
+    T_tip_part: Array
+    """(t, 4, 4), [m]: where the part is believed; the identity for the tip."""
+    grasp: Ints
+    """(t,): which of the grasps that were made, from 0; -1: the hand is empty."""
+
+
+def joints_in(joints: int) -> slice:
+    """Where the zeros of the encoders stand among the unknowns."""
+    return slice(TOOL.stop, TOOL.stop + joints)
+
+
+def grasp_in(joints: int, k: int) -> slice:
+    """Where the twist of the k-th grasp that was made, from 0, stands among the unknowns."""
+    first = TOOL.stop + joints + 6 * k
+    return slice(first, first + 6)
+
+
+def hand_eye_displacement(unknowns: Array, middle: Array) -> Array:
+    """E, (4, 4)."""
+    M = pose.rigid(np.eye(3), middle)
+    return np.asarray(M @ pose.exp(unknowns[HAND_EYE]) @ pose.inverse(M))
+
+
+def tip_displacement(unknowns: Array, J: Array) -> Array:
+    """exp(J delta) shift(tau), (4, 4): from where the robot believes its tip to where it is, but for E."""
+    return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ pose.rigid(np.eye(3), unknowns[TOOL]))
+
+
+def part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:
+    """Where the parts really are, and how their body twists depend on the unknowns.
+
+    Args:
+        unknowns: (u,).
+        middle: (3,), [m], world frame.
+
+    Returns:
+        T_world_part, (t, 4, 4), and D, (t, 6, u): unknowns that are more by d make it T_world_part exp(D d).
+    """
+    B, J, T_tip_part, grasp = places
+    M = pose.rigid(np.eye(3), middle)
+    joints = joints_in(J.shape[2])
+    holds = np.flatnonzero(grasp >= 0)
+    columns = (joints.stop + 6 * grasp[:, None] + np.arange(6))[holds]
+    gamma = np.zeros((len(grasp), 6))
+    gamma[holds] = unknowns[columns]
+    turned, D_xi = exp_and_jacobian(unknowns[HAND_EYE])
+    moved, D_delta = exp_and_jacobian(J @ unknowns[joints])
+    slipped, D_gamma = exp_and_jacobian(gamma)
+    D = np.zeros((len(grasp), 6, len(unknowns)))
+    # From the last factor of the product to the first: a twist before T is the twist Ad(T^-1) of it behind T.
+    T = T_tip_part
+    D[holds[:, None], :, columns] = np.swapaxes(_behind(T, D_gamma)[holds], 1, 2)
+    T = slipped @ T
+    D[:, :, TOOL] = _behind(T, np.eye(6)[:, :3])
+    T = pose.rigid(np.eye(3), unknowns[TOOL]) @ T
+    D[:, :, joints] = _behind(T, D_delta @ J)
+    T = pose.inverse(M) @ B @ moved @ T
+    D[:, :, HAND_EYE] = _behind(T, D_xi)
+    return M @ turned @ T, D
+
+
+def _behind(T: Array, twists: Array) -> Array:
+    """The twists behind T, (t, 6, k), that do what twists before it do."""
+    return np.asarray(pose.adjoint(pose.inverse(T)) @ twists)

@@ -1,0 +1,70 @@
+"""The squared length of a correction in standard deviations, chi-square, and its test.
+
+Where contacts contradict each other or parts fit with play, equations may be off: what they are off by, in standard
+deviations of its own, counts with z.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Consistency, largest
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value, softened_chi_square
+from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
+from apo_bench.correction.contact.problem import Problem
+from apo_bench.correction.solvers import (
+    NearestGoals,
+    jacobian_rank,
+)
+from apo_bench.geometry import Array
+
+
+def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[Array, NDArray[np.bool_]]:
+    """Squared lengths of corrections, (b,), and whether those are what the test asks for, (b,), as they stand.
+
+    They are if the contacts hold and what play leaves needs no further solution; else it is `relaxed_chi_square`.
+    """
+    holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= CONTRADICTION_M)
+    S = problem.play_covariance(chosen)
+    if S is not None:
+        Jt = nearest.Jt if isinstance(nearest.Jt, np.ndarray) else nearest.Jt[0].toarray()[None]
+        return softened_chi_square(nearest.z, Jt, S), holds
+    if problem.demands.slack_m is not None and problem.slack(chosen).any():
+        holds[:] = False
+    return np.square(nearest.z).sum(axis=1), holds
+
+
+def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[float, int]:
+    """The squared length of one correction and its degrees of freedom, the rank.
+
+    Where contacts contradict each other, or fit with play, the solver runs once more, with a standard deviation for
+    each equation, and the squares of what is left of the equations, in that unit, are added.
+    """
+    degrees = jacobian_rank(nearest.Jt[0])
+    if not nearest.finite[0]:
+        return np.inf, degrees
+    (chi_square,), (simple,) = chi_squares(problem, chosen, nearest)
+    if simple:
+        return float(chi_square), degrees
+    slack_m = problem.slack(chosen)
+    soft = (
+        slack_m if nearest.at_rest[0] and largest(nearest.e) <= CONTRADICTION_M else np.hypot(slack_m, CONTRADICTION_M)
+    )
+    relaxed = problem.nearest(chosen, soft)
+    softened = soft > 0.0
+    over = relaxed.e[0, softened] / soft[softened]
+    return float(relaxed.z[0] @ relaxed.z[0] + over @ over), degrees
+
+
+def chi_square_test(
+    problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals, chi_square: float, degrees: int
+) -> Consistency:
+    """The test of one squared length with its degrees of freedom, by the chi-square distribution.
+
+    Where errors have tails it is by draws, of which only dense matrices are made.
+    """
+    p = p_value(chi_square, degrees)
+    tails = problem.observation.tails
+    if tails is not None and degrees and np.isfinite(chi_square) and isinstance(nearest.Jt, np.ndarray):
+        drawn = drawn_chi_squares(problem.observation, problem.L[0], nearest.Jt[0], problem.play_covariance(chosen))
+        p = drawn_p_value(drawn, chi_square)
+    return Consistency(chi_square, degrees, p, problem.level)

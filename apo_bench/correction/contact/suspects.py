@@ -1,0 +1,68 @@
+"""Which relation to suspect if the test of a correction fails.
+
+Everything fits once a relation that is wrong is left out, so the relations are ranked by how well the rest fits without
+them. More than one may do: they form the ambiguity set, and no observation distinguishes them.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Suspect,
+)
+from apo_bench.correction.contact.problem import Problem
+from apo_bench.correction.contact.solved import pull, tested
+
+MOST_SUSPECTS = 64
+"""Relations that are left out in turn; of more, those that pull hardest."""
+
+
+def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
+    """Every relation that has contacts that are `kept`, (c,), left out in turn; the most suspect first.
+
+    Of more relations than `MOST_SUSPECTS` only those that pull hardest are tried.
+    """
+    arcs = problem.observation.assembly.arcs()
+    considered = [i for i, arc in enumerate(arcs) if kept[list(arc)].any()]
+    if len(considered) > MOST_SUSPECTS:
+        size = pull(problem, kept)
+        considered = sorted(sorted(considered, key=lambda i: -size[list(arcs[i])].sum())[:MOST_SUSPECTS])
+    return _ranked(problem, kept, [(f"R{i + 1}", arcs[i]) for i in considered])
+
+
+def contact_suspects(problem: Problem, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
+    """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
+    single = contacts_of(problem.observation.assembly, relation)
+    return _ranked(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
+
+
+def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]:
+    """The contacts of one relation, `R3`, by their names, `R3: stick.py on castle1.spy`: numbers in `relations()`."""
+    relations = assembly.relations()
+    together = dict[Contact, tuple[int, ...]]()
+    for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
+        contact = assembly.given(relations[j].contact)
+        together[contact] = (*together.get(contact, ()), j)
+    return {f"{relation}: {contact}": group for contact, group in together.items()}
+
+
+def _ranked(
+    problem: Problem, kept: NDArray[np.bool_], groups: Sequence[tuple[str, tuple[int, ...]]]
+) -> tuple[Suspect, ...]:
+    """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
+    relations = problem.observation.assembly.relations()
+    ranked = list[Suspect]()
+    for name, group in groups:
+        rest = kept.copy()
+        rest[list(group)] = False
+        test = tested(problem, rest)
+        contacts = tuple(dict.fromkeys(problem.observation.assembly.given(relations[j].contact) for j in group))
+        numbers = test.chi_square, test.freedom, test.p_value
+        ranked.append(Suspect(name, contacts, relations[group[0]].made, *numbers))
+    # A chi-square of f degrees of freedom has mean f and variance 2 f.
+    return tuple(sorted(ranked, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))

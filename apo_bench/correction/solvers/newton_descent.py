@@ -1,0 +1,61 @@
+"""The shortest correction where contacts bend as much as the correction is long: Newton's method.
+
+`gauss_newton` takes a step to the shortest z on the linearised contacts. Where these bend about what was observed, as
+for a part that was observed upside down, of which every rotation is about as far, its steps shrink by a percent only.
+The second derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions gives the step there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
+from apo_bench.correction.solvers.linear_step import goals_at
+from apo_bench.correction.solvers.whitened import correction_to
+from apo_bench.geometry import Array
+
+_ITERATIONS = 30
+_RANK = 1e-5
+"""Singular values below this part of the largest one are rounding: the contacts hold almost."""
+_APART = 1e-5
+"""Standard deviations between two derivatives whose difference is taken."""
+_FLAT = 1e-6
+"""Curvature along a free direction, at least: 1 where contacts do not bend."""
+
+
+def descended(system: CompactEquations, observed: Array, L: Array, goals: Array) -> Array:
+    """The nearest goals near consistent ones, (n, 4, 4).
+
+    Args:
+        observed: (n, 4, 4), what was seen, world frame, [m].
+        L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
+    """
+    z = correction_to(observed, L, goals)
+    for _ in range(_ITERATIONS):
+        (e,), (Jt,) = _linearised(system, observed, L, z[None])
+        # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
+        U, w, Vt = np.linalg.svd(Jt)
+        rank = int(np.count_nonzero(w > _RANK * w[0]))
+        N = U[:, rank:]
+        U = U[:, :rank]
+        w = w[:rank]
+        Vt = Vt[:rank]
+        multipliers = -Vt.T @ (U.T @ z / w)
+        towards = -U @ (Vt @ e / w)
+        # The Lagrangian's second derivative along N, 1 + sum l_i f_i'': f'' N as a difference of two derivatives.
+        _, beside = _linearised(system, observed, L, z + _APART * N.T)
+        bent = N + ((beside - Jt) @ multipliers).T / _APART
+        # Newton's step along N, downhill whatever the sign of a curvature.
+        curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)
+        slope = axes.T @ (N.T @ z + bent.T @ towards)
+        step = towards - N @ (axes @ (slope / np.maximum(np.abs(curvature), _FLAT)))
+        z = z + shortened_step(step, L)
+        if np.abs(step).max() < STEP:
+            break
+    return goals_at(observed, L[None], z[None])[0][0]
+
+
+def _linearised(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+    """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
+    return linearised_by(system, *goals_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

@@ -1,0 +1,133 @@
+"""The starts of `APOInsert-v0`: trials executed up to where the policy takes over."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
+from apo_bench.envs.robot import RobotSettings
+from apo_bench.geometry import Array, pose
+from apo_bench.judging.verdict import Verdict, judge
+from apo_bench.perception.observation.noise import Noise
+from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
+from apo_bench.simulation.task.tip_control import TipControl
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.stages import (
+    WRENCH,
+    demonstration_failure,
+    observe_demonstration,
+    simulate_demonstration,
+    stream_key,
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class EpisodeStart:
+    """A trial up to where the policy takes over, with its truth."""
+
+    trial: int
+    start: Start
+    plan: Plan
+    error: RobotError | None
+    poses: Array
+    """(n, 4, 4), the true poses of the operations, world frame, [m]."""
+    covariances: Array
+    """(n, 6, 6), stated, of the twist by which each part may be wrong at its goal, in its own frame, [m, rad]."""
+
+    @property
+    def reference(self) -> Array:
+        """(k + 1, 4, 4), the true poses up to this operation, world frame, [m]."""
+        return self.poses[: self.start.operation + 1]
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), that of this operation."""
+        return np.asarray(self.covariances[self.start.operation])
+
+    def off(self, control: TipControl) -> Array:
+        """The error of the part relative to its neighbours as they stand now; as `TipControl.off`."""
+        assembly = self.plan.assembly
+        k = self.start.operation
+        operation = assembly.operations[k]
+        true = placements(assembly, self.plan.start, self.poses)[k]
+        now = control.poses()
+        # Where a part in the hand, the main one or one that it carries, belongs beside a part that stands.
+        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
+        wanted = [
+            now[there] @ pose.inverse(true[there]) @ true[held] @ pose.inverse(now[held]) for held, there in pairs
+        ]
+        return control.off([T @ now[operation.main] for T in wanted])
+
+
+class Trials(NamedTuple):
+    """What determines a start besides the number of its trial."""
+
+    scene: Scene
+    operation: int
+    human_error_scale: float
+    noise: Noise
+    corrector: Any
+    robot: RobotSettings
+
+    def begin(self, trial: int) -> EpisodeStart | Outcome:
+        """Demonstrate, observe, correct, and execute the operations before; or the failure on the way there."""
+        scene, k, human_error_scale, noise, corrector, robot = self
+        simulated = simulate_demonstration(scene, human_error_scale, trial)
+        if simulated.demonstration.code != "ok":
+            return demonstration_failure(simulated.demonstration)
+        seen = observe_demonstration(simulated, noise, trial)
+        made = apply_method(corrector, seen, simulated.layout.poses, where=scene)
+        if made.plan is None:
+            assert made.failure is not None
+            return made.failure
+        config = robot.execution(made.plan, scene, trial)
+        sensor = robot.ft_sensor, (*stream_key(trial, WRENCH), 1)
+        start = prepare_start(made.plan, scene, k, replace(config, time_limit_s=math.inf), sensor)
+        if isinstance(start, Outcome):
+            return start
+        before = judged(scene, start.after, start.after[-1], simulated.layout.poses[:k]) if k else None
+        if before is not None and not before.success:
+            code = before.rests_on.code
+            return Outcome("judge", code, None, f"the operations before are not right: {before.rests_on.why or code}")
+        return EpisodeStart(
+            trial,
+            start,
+            made.plan,
+            config.robot_error,
+            simulated.layout.poses,
+            _stated(seen, made.correction, robot.assumed),
+        )
+
+    def go_on(self, begun: EpisodeStart, control: TipControl, reached: Snapshot) -> EpisodeStart | Outcome:
+        """The start of the next operation after one is done; or the failure on the way there."""
+        key = (*stream_key(begun.trial, WRENCH), 1 + len(begun.reference))
+        start = prepare_next_start(
+            begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.ft_sensor, key)
+        )
+        return start if isinstance(start, Outcome) else replace(begun, start=start)
+
+
+def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | None, reference: Array) -> Verdict:
+    """The judge's verdict on the first operations alone.
+
+    Args:
+        after: After each of them.
+        reference: (k, 4, 4), their true poses, world frame, [m].
+    """
+    return judge(scene.scenario.assembly.first(len(after)), Reached(after, final), reference, scene.criteria)
+
+
+def _stated(seen: Observation, correction: Correction | None, assumed: str | None) -> Array:
+    """The covariance that the corrector leaves, and that of the assumed robot error without its joints, (n, 6, 6)."""
+    posterior = None if correction is None else correction.covariance
+    covariance = seen.covariance if posterior is None else posterior
+    sigmas = robot_sigmas(assumed or NO_ROBOT_ERROR)
+    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])
+    deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])
+    return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))

@@ -1,0 +1,85 @@
+"""A wrapper for libraries that need flat float32 observations and actions between -1 and 1."""
+
+from typing import Any, final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from apo_bench.arguments import check_arguments
+from apo_bench.errors import InputError, shown
+
+Flat = NDArray[np.float32]
+
+
+@final
+@check_arguments
+class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordConstructorArgs):
+    """Flatten observations and actions of any environment of this package.
+
+    Observations are one `Box` of float32, as `gymnasium.spaces.flatten` orders them. Actions are one `Box` of float32
+    in [-1, 1]: the numbers of a `Box` are scaled to its bounds, and of the numbers of a `Discrete` the largest counts.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        """Wrap an environment.
+
+        Raises:
+            InputError: Its actions are neither a `Box` nor a `Dict` of `Box` and `Discrete`.
+        """
+        gymnasium.utils.RecordConstructorArgs.__init__(self)
+        super().__init__(env)
+        seen = spaces.flatten_space(env.observation_space)
+        assert isinstance(seen, spaces.Box)
+        self.observation_space = self._seen = spaces.Box(
+            seen.low.astype(np.float32), seen.high.astype(np.float32), dtype=np.float32
+        )
+        self._size = sum(map(_size, _parts(env.action_space).values()))
+        self.action_space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Flat, dict[str, Any]]:
+        """As in the environment, flat."""
+        seen, info = self.env.reset(seed=seed, options=options)
+        return self._flat(seen), info
+
+    def step(self, action: Flat) -> tuple[Flat, float, bool, bool, dict[str, Any]]:
+        """As in the environment, flat.
+
+        Raises:
+            InputError: The action is not in the action space.
+        """
+        given = np.asarray(action, dtype=np.float32)
+        if not self.action_space.contains(given):
+            raise InputError(f"the action {shown(action)} was given; {self._size} numbers from -1 to 1 are allowed.")
+        seen, reward, terminated, truncated, info = self.env.step(self._action(given))
+        return self._flat(seen), float(reward), terminated, truncated, info
+
+    def _flat(self, seen: Any) -> Flat:
+        flat: Any = spaces.flatten(self.env.observation_space, seen)
+        return np.clip(flat, self._seen.low, self._seen.high).astype(np.float32)
+
+    def _action(self, given: Flat) -> Any:
+        made: dict[str, Any] = {}
+        for name, part in _parts(self.env.action_space).items():
+            numbers, given = np.split(given, [_size(part)])
+            made[name] = int(np.argmax(numbers)) if isinstance(part, spaces.Discrete) else _scale(part, numbers)
+        return made if isinstance(self.env.action_space, spaces.Dict) else made[""]
+
+
+def _parts(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
+    """The parts of an action space by name."""
+    parts = dict(space.spaces) if isinstance(space, spaces.Dict) else {"": space}
+    if not all(isinstance(part, spaces.Box | spaces.Discrete) for part in parts.values()):
+        raise InputError(f"an environment with actions {space} was given; only Box and Discrete can be flattened.")
+    return parts
+
+
+def _size(part: spaces.Space[Any]) -> int:
+    return int(part.n) if isinstance(part, spaces.Discrete) else int(np.prod(part.shape or ()))
+
+
+def _scale(part: Any, numbers: Flat) -> Any:
+    """Numbers from -1 to 1 within the bounds of a `Box`."""
+    share = 0.5 * (1.0 + numbers.reshape(part.shape).astype(np.float64))
+    return (part.low + share * (part.high - part.low)).astype(part.dtype)

@@ -1,0 +1,35 @@
+"""The JSON form of a plan: versioned, with the target pose of every operation and the steps of its schedule."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly import Plan
+from apo_bench.formats.json_forms import Form, pose_form
+
+PLAN_SCHEMA = "apo-bench/plan/2"
+
+
+def plan_form(plan: Plan, scenario: str) -> Form:
+    """Return the JSON form of a plan; a step has a pose where that is not the target pose of its operation.
+
+    Args:
+        scenario: Its name, or its file.
+    """
+    operations = [
+        {"operation": k + 1, "part": operation.main, **pose_form(plan.target_poses[k])}
+        for k, operation in enumerate(plan.assembly.operations)
+    ]
+    schedule: list[dict[str, Any]] = []
+    for step, target in zip(plan.schedule, plan.step_poses, strict=True):
+        schedule.append({"operation": step.operation + 1, "undo": step.undo})
+        if not np.array_equal(target, plan.target_poses[step.operation]):
+            schedule[-1] |= pose_form(target)
+    start = {part: pose_form(T) for part, T in plan.start.items()}
+    return {
+        "schema": PLAN_SCHEMA,
+        "scenario": scenario,
+        "start": start,
+        "operations": operations,
+        "schedule": schedule,
+    }

@@ -1,0 +1,115 @@
+"""Find where a held part can lie flat on what is fixed, before it is inserted.
+
+On a plane its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper). A level
+insertion needs them, and pads that only centre across cannot give them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from shapely import MultiPoint
+
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depths, own_shape, plane_frame, pose
+from apo_bench.planning.insertion.macros import UP
+from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
+from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
+from apo_bench.simulation.robot import translate
+from apo_bench.simulation.scene import Scene
+
+NOISE_LEVEL = float(np.cos(np.radians(10.0)))
+"""A face that looks up by less than ten degrees off is one to lie on."""
+_LOWEST_M = 1e-4
+"""Corners this near to the lowest one lie on the floor."""
+_LIFT_M = 0.01
+"""What stood is lifted so far before it is laid down again."""
+_LIFT_ROOM_M = 0.002
+_LIFT_STEP_M = 0.003
+"""On the way down everything else stays this far away; it is looked at this often."""
+
+
+class FlatPlacement(NamedTuple):
+    """A part laid flat."""
+
+    T: Array
+    """Its pose, (4, 4), world."""
+    normal: Array
+    """Of the floor, upwards, (3,), world."""
+    feet: Array
+    """Corners of the part on which it lies, (k, 3), in its own frame, [m]: at most four, far apart."""
+
+
+def before_insertion(t: Transfer) -> Array:
+    """Where a part is when its last motion begins, (4, 4), world."""
+    before = translate(first_contact_pose(t), t.into.way, -t.begins)
+    return translate(before, UP, t.floats) if t.into.level else before
+
+
+def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated: Poses) -> FlatPlacement | None:
+    """The part flat on a fixed face straight below where a level insertion begins; before one from above, where it
+    stood. None where it cannot.
+
+    Args:
+        estimated: Where all parts are before the transfer.
+    """
+    T = before_insertion(t) if t.into.level else translate(t.T_world_start, UP, _LIFT_M)
+    up = upwards(T)
+    lying = [
+        each
+        for part in assembly.fixed
+        for face in assembly.solids[part].faces.values()
+        if estimated[part][2, :3] @ face.normal > NOISE_LEVEL
+        for each in [_on(scene, t.part, T, up, face, estimated[part])]
+        if each is not None and each.T[2, 3] < T[2, 3]
+    ]
+    if not lying:
+        return None
+    highest = max(lying, key=lambda each: float(each.T[2, 3]))
+    flush = highest.T
+    far = float(T[2, 3] - flush[2, 3])
+    lifts = np.linspace(far, 0.0, max(2, round(far / _LIFT_STEP_M)))[:, None] * UP
+    others = obstacles(assembly.solids, estimated, (t.part, *assembly.fixed))
+    fixed = obstacles(assembly.solids, estimated, (t.part, *(set(assembly.solids) - assembly.fixed)))
+    R = flush[:3, :3]
+    pieces = scene.pieces[t.part]
+    for each in others:
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _LIFT_ROOM_M).max() > -_LIFT_ROOM_M:
+            return None
+    for each in fixed:  # down to the floor itself, which it touches
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max() > 0.0:
+            return None
+    tip = flush @ t.grips[0].T_part_tip
+    width = t.grips[0].half_width
+    if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
+        return None
+    return highest
+
+
+def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> FlatPlacement | None:
+    """The part above a face put down flat on it, if all that lies on it is inside of its outline."""
+    n = T_floor[:3, :3] @ floor.normal
+    axis = np.cross(T[:3, :3] @ up, n)
+    sine = float(np.linalg.norm(axis))
+    flat = np.array(T)
+    if sine > 0.0:
+        flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
+    origin = T_floor @ plane_frame(floor)
+    height = float(n @ (flat[:3, 3] - origin[:3, 3])) + extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
+    flat[:3, 3] -= height / float(n @ UP) * UP
+    corners = all_corners(scene.pieces[part])[0]
+    heights = corners @ (flat[:3, :3].T @ n)
+    feet = corners[heights < heights.min() + _LOWEST_M]
+    on_floor = pose.apply(pose.inverse(origin) @ flat, feet)[:, :2]
+    if not own_shape(floor).covers(MultiPoint(on_floor).convex_hull):
+        return None
+    return FlatPlacement(flat, n, feet[_far_apart(on_floor)])
+
+
+def _far_apart(points: Array) -> list[int]:
+    """Which of points in a plane, (k, 2), are the ends of the longest way and the ends across it; each once."""
+    ahead = points - points.mean(axis=0)
+    first = int(np.argmax((ahead * ahead).sum(axis=1)))
+    along = ahead @ ahead[first]
+    across = ahead @ np.array([-ahead[first][1], ahead[first][0]])
+    ends = (first, int(np.argmin(along)), int(np.argmin(across)), int(np.argmax(across)))
+    return sorted(set(ends))

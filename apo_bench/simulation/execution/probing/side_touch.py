@@ -1,0 +1,56 @@
+"""Touch a fixed wall with the side of a held part, before it is inserted from above."""
+
+from apo_bench.geometry import Array
+from apo_bench.simulation.execution.probing.state import ProbingState
+from apo_bench.simulation.execution.probing.touching import BEYOND_M, SPEED
+from apo_bench.simulation.execution.side_touches import STAND_OFF_M, SideTouch
+from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.robot import (
+    Robot,
+    part_loads,
+    press,
+    reading,
+    smooth_trajectory,
+    steady_trajectory,
+    translate,
+    with_height,
+)
+from apo_bench.simulation.scene import allow_sleep
+
+_CARRY = 0.4
+"""Peak speed of the part in the air, [m/s]."""
+_DOWN = 0.2
+"""Peak speed down to the wall, to it and up again, [m/s]."""
+
+
+def touch_side(
+    robot: Robot, probing: ProbingState, operation: int, t: Transfer, place: SideTouch, grip: Grip, held: Array
+) -> Grip:
+    """Go there, press, come back; returns how the part is known to be held now.
+
+    Args:
+        held: Where it was estimated in the frame of the tip when it was taken, (4, 4).
+
+    Raises:
+        ExecutionAborted: It fell out of the hand, or something was struck.
+    """
+    T = place.T @ grip.T_part_tip
+    high = max(t.safe, float(T[2, 3]))
+    robot.macro = "touch-wall"
+    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _DOWN))
+    robot.go(with_height(T, high), _CARRY)
+    robot.follow(smooth_trajectory(robot.T, T, _DOWN))
+    robot.stand()
+    touches = []
+    # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
+    with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
+        probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
+        end = translate(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
+        left = press(robot, steady_trajectory(robot.T, end, SPEED), place.way, probing.touch_n, probing.wrist)
+        if left is not None:
+            n, d = probing.plane_by_camera(place.normal, place.edge)
+            touches = [probing.touch(robot, n, d, place.point, (operation, held))]
+        probing.wrist.hold()
+        robot.follow(smooth_trajectory(robot.T, T, _DOWN))
+    robot.follow(smooth_trajectory(robot.T, with_height(T, high), _DOWN))
+    return probing.grip(operation, touches, held, grip)

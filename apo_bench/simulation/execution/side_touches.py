@@ -1,0 +1,138 @@
+"""Find where the side of a held part can touch a fixed wall, before the part is inserted from above.
+
+The part leans towards the wall and touches it with the place of its side at the height of its upper edge. Two places,
+one low and one high, show where the part lies along the pads and how it is turned about their normal: the feet of a
+small round part are too near to each other to show its tilt.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, Face, extent, intrusion_depths, pose
+from apo_bench.planning.insertion.macros import UP
+from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
+from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.execution.transfer import Transfer
+from apo_bench.simulation.frames import frame
+from apo_bench.simulation.robot import Obstacle, turn_from, with_height
+from apo_bench.simulation.scene import Scene
+
+LEAN_RAD = float(np.radians(3.0))
+"""More than a part that was laid down is still turned in the hand."""
+STAND_OFF_M = 0.004
+"""A touch begins so far before it is expected."""
+_OVER_M = 0.003
+"""The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
+_APART_M = 0.01
+"""Places that are less far apart determine a tilt no better than feet do."""
+_ROOM_M = 0.001
+_STEP_M = 0.002
+_LOOKS_M = 0.004
+
+
+class SideTouch(NamedTuple):
+    """One touch of a wall with the side of a part."""
+
+    T: Array
+    """Where the part is when the motion begins, (4, 4), world."""
+    way: Array
+    """Unit vector, (3,), world: into the wall, along which the pads do not give way."""
+    point: Array
+    """What touches, (3,), in the frame of the part, [m]."""
+    normal: Array
+    """Of the wall, outwards, (3,), world."""
+    edge: Array
+    """Where it is touched, (3,), world, [m]."""
+
+
+def upright_walls(assembly: Assembly, poses: Poses) -> Iterator[tuple[str, Face]]:
+    """Upright flat faces of what is fixed that something is fitted to, and those around a bore that something is
+    fitted into."""
+    done = set[tuple[str, str]]()
+    for operation in assembly.operations:
+        for contact in operation.contacts:
+            for of in contact:
+                if of.part not in assembly.fixed:
+                    continue
+                solid = assembly.solids[of.part]
+                named = [of.face] if of.face in solid.faces else list(solid.faces)
+                for name in named:
+                    face = solid.faces[name]
+                    upright = abs(float(poses[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - NOISE_LEVEL**2)
+                    if upright and (of.part, name) not in done:
+                        done.add((of.part, name))
+                        yield of.part, face
+
+
+def find_side_touches(
+    assembly: Assembly, scene: Scene, t: Transfer, upright: Array, estimated: Poses
+) -> tuple[SideTouch, ...]:
+    """A low and a high place of the part at one wall; none where there is no room.
+
+    Args:
+        upright: How the part stands, (3, 3), world, but for its turn about the vertical.
+        estimated: Where all parts are before the transfer.
+    """
+    for part, face in upright_walls(assembly, estimated):
+        n = estimated[part][:3, :3] @ face.normal
+        corners = pose.apply(estimated[part], face.outline)
+        low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
+        deep = high - low - _OVER_M
+        if face.fit or deep - _OVER_M < _APART_M:
+            continue
+        (wall,) = obstacles(assembly.solids, estimated, tuple(set(assembly.solids) - {part}))
+        others = obstacles(assembly.solids, estimated, (t.part, part))
+        along = np.cross(UP, n)
+        ends = corners @ along
+        lines = np.arange(ends.min() + _STEP_M, ends.max(), _STEP_M)
+        for at in sorted(lines, key=lambda at: abs(at - ends.mean())):
+            edge = at * along + float(n @ corners[0]) * n + high * UP
+            for R in _upright_turns(scene, t, upright, n):
+                both = tuple(_at(scene, t, R, n, edge, up) for up in (_OVER_M, deep))
+                if all(_free(scene, t, each, wall, others) for each in both):
+                    return both
+    return ()
+
+
+def _upright_turns(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[Array]:
+    """How the part stands, (3, 3), when the pads are along the wall's normal, either way, the nearer to rest first."""
+    rest = scene.kinematics.forward(scene.arm.home)
+    y = upright @ t.grips[0].T_part_tip[:3, 1]
+    both = []
+    for to in (n, -n):
+        turn = float(np.arctan2(np.cross(y, to) @ UP, y @ to))
+        both.append(pose.exp(np.append(np.zeros(3), turn * UP))[:3, :3] @ upright)
+    return sorted(both, key=lambda R: abs(turn_from(rest, frame(R @ t.grips[0].T_part_tip[:3, :3], np.zeros(3)))))
+
+
+def _at(scene: Scene, t: Transfer, R: Array, n: Array, edge: Array, up: float) -> SideTouch:
+    """The part before the wall, leaned towards it, with a point of its side that is so high over its lowest one."""
+    pieces = scene.pieces[t.part]
+    along = np.cross(UP, n)
+    sides = extent(pieces, R.T @ along)
+    point = R.T @ ((extent(pieces, R.T @ UP)[0] + up) * UP + extent(pieces, R.T @ n)[0] * n + np.mean(sides) * along)
+    leaned = pose.exp(np.append(np.zeros(3), LEAN_RAD * np.cross(UP, -n)))[:3, :3] @ R
+    return SideTouch(frame(leaned, edge + STAND_OFF_M * n - leaned @ point), -n, point, n, edge)
+
+
+def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: tuple[Obstacle, ...]) -> bool:
+    """Whether part and hand have room on the way straight down and to the wall, and the arm reaches there."""
+    grip = t.grips[0]
+    tip = place.T @ grip.T_part_tip
+    above = np.arange(0.0, t.safe, _LOOKS_M)[:, None] * UP
+    aside = _ROOM_M * np.cross(UP, place.normal)
+    into = (STAND_OFF_M + _ROOM_M) * place.way
+    whole = np.vstack([above + aside, above - aside, into + aside, into - aside])
+    R = place.T[:3, :3]
+    for each, shifts in ((wall, above), *((other, whole) for other in others)):
+        at = place.T[:3, 3] + shifts
+        if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
+            return False
+    at = tip[:3, 3] + whole
+    if gripper_depth(scene, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
+        return False
+    over = scene.kinematics.inverse(with_height(tip, t.safe), np.array(scene.arm.home))
+    return over is not None and scene.kinematics.inverse(tip, over) is not None

@@ -1,0 +1,118 @@
+"""Carry out one operation by two hands: take, carry over the others, bring to its place, let go."""
+
+import numpy as np
+
+from apo_bench.geometry import Array, pose
+from apo_bench.planning.insertion.macros import UP
+from apo_bench.simulation.human.hands import Hands
+from apo_bench.simulation.human.operation import HandOperation
+from apo_bench.simulation.robot import Trajectory, minimum_jerk, smooth_trajectory, translate, with_height
+
+_SPEED = 0.9
+"""Peak speed of a hand that carries a part through the air, [m/s]."""
+_STROKE = 0.15
+"""Peak speed of a hand that brings a part to its place, [m/s]."""
+_SHIFT = 0.03
+"""Peak speed of a small adjustment, and of coming to lie against another part, [m/s]."""
+_NUDGE = 0.01
+"""Peak speed of lifting and lowering a part for an adjustment, [m/s]."""
+_SAFE_M = 0.16
+"""Least height at which parts are carried over the others."""
+_DROP_M = 0.0002
+"""A part is let go this much above its support, as a hand does not press it into the table."""
+_LIFT_M = 0.0003
+"""How far a part is lifted while it is adjusted, so that it does not drag the one below."""
+STAND_STILL_S = 0.3
+_SETTLE_S = 0.15
+"""A group trails behind a quick hand by a millimetre; so long it takes to catch up."""
+
+
+def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
+    """Carry it out, and wait until everything rests."""
+    T = hands.grab(0, operation.part)
+    for part in operation.carries:
+        hands.add(0, part)
+    before, beside, goal = _ends(hands, operation, T, clearance_m)
+    if operation.out.any():
+        T = _free(hands, T, operation.out, clearance_m)
+    safe = max(_SAFE_M, operation.over, before[2, 3])
+    for end in (with_height(T, max(safe, T[2, 3])), with_height(before, safe), before):
+        hands.move((0, smooth_trajectory(T, end, _SPEED, turn_speed=4.0)))
+        T = end
+    for part in (part for part in operation.late if part in operation.carries):
+        hands.wait(_SETTLE_S)
+        _shift_carried(hands, operation, part, clearance_m)
+    _place(hands, operation, smooth_trajectory(before, beside, _STROKE))
+    if operation.aside.any():
+        hands.move((0, smooth_trajectory(beside, goal, _SHIFT)))
+        hands.wait(0.05)
+    hands.let_go(0, operation.part, *operation.carries)
+    hands.wait(STAND_STILL_S)
+
+
+def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
+    """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
+    raised = translate(T, UP, clearance_m)
+    hands.move((0, smooth_trajectory(T, raised, _NUDGE)))
+    hands.move((0, smooth_trajectory(raised, translate(raised, out, 1.0), _STROKE)))
+    return translate(raised, out, 1.0)
+
+
+def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) -> tuple[Array, Array, Array]:
+    """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go.
+
+    Over a floor without play the part is held up by half the clearance, as friction would hold it back.
+    """
+    goal = target = translate(operation.target, UP, clearance_m / 2) if operation.drags else operation.target
+    if operation.from_above:
+        goal = translate(operation.target, UP, _DROP_M + (_rise(hands, operation, T) if operation.carries else 0.0))
+    beside = translate(goal, operation.aside, 1.0) if operation.aside.any() else goal
+    return translate(translate(target, operation.way, -operation.travel), operation.aside, 1.0), beside, goal
+
+
+def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
+    """How much higher a group must end than planned, as it hangs in the hand, so that nothing ends too deep, [m]."""
+    way = operation.target @ pose.inverse(T)
+    return max(float(operation.true[part][2, 3] - (way @ hands.pose(part))[2, 3]) for part in operation.bearing)
+
+
+def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
+    """The last motion; the other hand adjusts what is displaced on the way, the last of it while the part arrives."""
+    standing = [part for part in operation.late if part not in operation.carries]
+    for part in standing[:-1]:
+        _adjust(hands, part, operation.true[part], _LIFT_M, ())
+        hands.let_go(1, part)
+    if standing:
+        _adjust(hands, standing[-1], operation.true[standing[-1]], _LIFT_M, ((0, _first(stroke, 0.15)),))
+        hands.move((0, smooth_trajectory(_first(stroke, 0.15).end, stroke.end, _STROKE)))
+    else:
+        hands.move((0, stroke))
+    hands.wait(0.05)
+    hands.let_go(1, *standing[-1:])
+
+
+def _shift_carried(hands: Hands, operation: HandOperation, part: str, clearance_m: float) -> None:
+    """Shift a part of the group to its true place beside the main part; lowered, so that it does not rub."""
+    there = hands.pose(operation.part) @ pose.inverse(operation.true[operation.part]) @ operation.true[part]
+    _adjust(hands, part, there, -clearance_m, (), held=True)
+    hands.wait(0.05)
+    hands.add(0, part)
+    hands.let_go(1, part)
+
+
+def _adjust(
+    hands: Hands, part: str, true: Array, lift: float, meanwhile: tuple[tuple[int, Trajectory], ...], held: bool = False
+) -> None:
+    """Lift, shift and lower a part to its true place at the height where it is; the hand then still holds it."""
+    here = hands.grab(1, part)
+    if held:
+        hands.let_go(0, part)
+    there = with_height(true, here[2, 3])
+    hands.move((1, smooth_trajectory(here, translate(here, UP, lift), _NUDGE)))
+    hands.move((1, smooth_trajectory(translate(here, UP, lift), translate(there, UP, lift), _SHIFT)), *meanwhile)
+    hands.move((1, smooth_trajectory(translate(there, UP, lift), there, _NUDGE)))
+
+
+def _first(stroke: Trajectory, fraction: float) -> Trajectory:
+    """The first part of a stroke, as a motion."""
+    return Trajectory(stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, minimum_jerk)

@@ -1,0 +1,62 @@
+"""Nominal poses of a scenario, moved on the table to fit an observation; they use no contact, and no corrector.
+
+Whatever the relative poses of a layout are, a plan of them builds the same assembly.
+"""
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from apo_bench.assembly import Observation
+from apo_bench.geometry import Array, pose
+
+
+def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
+    """The nominal poses where x, y and yaw fit best the observed ones.
+
+    Least squares over all observed operations, each twist weighted with its stated covariance S = L L^t:
+    min sum |L^-1 log((A N_k)^-1 G_k)|^2 over A = (x, y, yaw), with N_k nominal and G_k observed.
+
+    Args:
+        nominal: (n, 4, 4), frame of the assembly, [m].
+        observation: With at least one observed operation.
+
+    Returns:
+        (n, 4, 4), world frame, [m].
+    """
+    observed = np.flatnonzero(observation.observed)
+    # whitened by L^-1, where S = L L^t, a twist counts in standard deviations
+    factors = [np.linalg.inv(np.linalg.cholesky(observation.covariance[k])) for k in observed]
+
+    def residuals(place: Array) -> Array:
+        T = _planar(place)
+        twists = [pose.log(pose.inverse(T @ nominal[k]) @ observation.poses[k]) for k in observed]
+        return np.concatenate([L @ twist for L, twist in zip(factors, twists, strict=True)])
+
+    start = _first_guess(nominal[observed], observation.poses[observed])
+    return np.asarray(_planar(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
+
+
+def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
+    """The nominal poses (n, 4, 4) shifted and turned on the table to the first operation that was observed, [m]."""
+    k = int(np.argmax(observation.observed))
+    # of the whole motion from nominal to observed only the yaw and the shift on the table are taken
+    T = observation.poses[k] @ pose.inverse(nominal[k])
+    flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
+    flat[:2, 3] = (observation.poses[k] - flat @ nominal[k])[:2, 3]
+    return np.asarray(flat @ nominal)
+
+
+def _first_guess(nominal: Array, observed: Array) -> Array:
+    """(x, y, yaw): the mean turn of the parts, then the mean of the remaining shifts."""
+    # the mean yaw maximises the sum of tr(Rz(yaw)^t R_k) over the turns R_k from nominal to observed
+    turns = observed[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    sine = (turns[:, 1, 0] - turns[:, 0, 1]).sum()
+    yaw = float(np.arctan2(sine, (turns[:, 0, 0] + turns[:, 1, 1]).sum()))
+    T = _planar(np.array([0.0, 0.0, yaw]))
+    return np.append((observed[:, :2, 3] - (T @ nominal)[:, :2, 3]).mean(axis=0), yaw)
+
+
+def _planar(place: Array) -> Array:
+    """(x, y, yaw) as (4, 4)."""
+    x, y, yaw = place
+    return pose.at((x, y, 0.0), (0.0, 0.0, float(np.degrees(yaw))))

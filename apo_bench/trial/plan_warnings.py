@@ -1,0 +1,50 @@
+"""Sentences on what speaks against a plan, for commands."""
+
+import numpy as np
+
+from apo_bench.assembly import Correction, Plan
+from apo_bench.planning.prediction.failure import predict
+from apo_bench.scenario import Scenario, layout_at
+from apo_bench.simulation.arm_checks.plan_check import arm_moves
+from apo_bench.simulation.scene import build_scene
+
+
+def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
+    """`the stated noise does not explain the correction (p = 0.0004); predicted: operation 3 (stick) will fail: ..`.
+
+    Empty if nothing speaks against the plan.
+
+    Args:
+        correction: What the corrector returned; None without a corrector.
+    """
+    sentences = []
+    test = None if correction is None else correction.test_after or correction.test
+    if test is not None and not test.passes:
+        sentences.append(f"the stated noise does not explain the correction (p = {test.p_value:.2g})")
+    prediction = predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach)
+    if prediction.fails:
+        sentences.append(f"predicted: {prediction.sentence}")
+    return "; ".join(sentences)
+
+
+def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
+    """`panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.
+
+    If nothing fails, the sentence states how far the joints stay from their limits.
+
+    Args:
+        plan: None: the nominal one in the middle of its place on the table.
+
+    Raises:
+        InputError: The arm is unknown, or its gripper cannot hold a part.
+    """
+    scene = build_scene(scenario, arm=arm)
+    if plan is None:
+        x, y = scenario.site.center_m
+        at = layout_at(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
+        plan = Plan(scenario.assembly, at.start, at.poses)
+    moves = arm_moves(plan, scene)
+    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
+    margins = [move.margin_deg for move in moves if move.margin_deg is not None]
+    room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not prediction.fails else ""
+    return f"{arm}: {prediction.sentence}{room}"

@@ -1,0 +1,71 @@
+"""Pose errors of a plan or a replay, split into what contacts fix and what they leave free."""
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Poses, Reached
+from apo_bench.assembly.equations import equations
+from apo_bench.correction.solvers import LENGTH_M
+from apo_bench.geometry import Array, pose, turn_alike
+
+_RANK_CUT_OFF = 1e-7
+"""At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
+
+
+def pose_errors(
+    assembly: Assembly, start: Poses, truth_goals: Array, reached: Reached
+) -> tuple[float | None, float | None]:
+    """The pose errors of main parts when their operations were over, as `goal_errors` has them.
+
+    Returns:
+        (fixed, free), [mm]; (None, None) if an operation was not finished.
+    """
+    if any(snapshot is None for snapshot in reached.after):
+        return None, None
+    at = [s.poses[operation.main] for operation, s in zip(assembly.operations, reached.after, strict=True) if s]
+    return goal_errors(assembly, start, truth_goals, np.array(at).reshape(-1, 4, 4))
+
+
+def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Array) -> tuple[float, float]:
+    """Root mean square per operation of the error of goals, in fixed and in free directions, [mm].
+
+    The error of an operation is the body twist from the true goal to the other one, rotations as the way of a point
+    40 mm off the origin. How far a part of revolution is turned about its axis is no error, unless it carries others.
+    The row space of the Jacobian of the contact equations at the truth is what the contacts
+    fix, its null space what they leave free.
+
+    Args:
+        assembly: With the right relations.
+        truth_goals: (n, 4, 4), consistent, world frame, [m].
+        goals: (n, 4, 4), world frame, [m].
+
+    Returns:
+        (fixed, free).
+    """
+    # rotations count as ways of a point at LENGTH_M, so that all coordinates are lengths
+    unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
+    goals = _turned_back(assembly, truth_goals, goals)
+    error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
+    _, J = equations(assembly, start, truth_goals).linearised(truth_goals)
+    # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
+    basis = _row_space(J / unit)
+    fixed = basis.T @ (basis @ error)
+    return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
+
+
+def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
+    """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
+    alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
+    pairs = zip(alone, goals, truth_goals, strict=True)
+    return np.array([T if solid is None else turn_alike(solid, T, true) for solid, T, true in pairs]).reshape(-1, 4, 4)
+
+
+def _rms_mm(error: Array, operations: int) -> float:
+    return float(np.linalg.norm(error) / np.sqrt(operations)) * 1e3
+
+
+def _row_space(J: Array) -> Array:
+    """An orthonormal basis of the row space, (rank, columns)."""
+    if not J.size:
+        return np.zeros((0, J.shape[1]))
+    _, w, Vt = np.linalg.svd(J, full_matrices=False)
+    return Vt[w > _RANK_CUT_OFF * w[0]]

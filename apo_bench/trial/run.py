@@ -1,0 +1,297 @@
+"""Run one trial: demonstrate, observe, choose contacts, correct, fit, predict, execute, judge, record.
+
+Noise enters through the streams of `stages` alone: layout, human, observation, contacts, robot and sensor draw from
+one each. The stage that fails makes the outcome with its code (`records.outcomes` has all of them); this module only
+passes it on. Everything here is in m and rad; `outcome_columns` turns it into the mm and degrees of a record.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast, final
+
+from apo_bench.arguments import check_arguments
+from apo_bench.assembly import Observation, Plan
+from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigmas
+from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.errors import require
+from apo_bench.geometry import Array
+from apo_bench.names import function_name
+from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
+from apo_bench.perception.observation.reobservations import Reobservations
+from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from apo_bench.records import (
+    DEPTH_CAMERA,
+    DETECTED,
+    USUAL_FT_SENSOR,
+    TrialConfig,
+    TrialRecord,
+    assumed_error,
+    knows_truth,
+    parse_method,
+    robot_sigmas,
+    uses_contacts,
+)
+from apo_bench.records.run.validation import unwritable
+from apo_bench.scenario import Scenario, scenario_names
+from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
+from apo_bench.simulation.hooks import Hooks
+from apo_bench.simulation.scene import Scene
+from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
+from apo_bench.trial.endings import end_record, record_misbehaviour, start_record
+from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.keywords import configure_trial
+from apo_bench.trial.nominal import move_nominal_poses
+from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.predicted_success import abstain, predict_success
+from apo_bench.trial.stages import (
+    CONTACT_SOURCE,
+    WRENCH,
+    SimulatedDemonstration,
+    demonstration_failure,
+    demonstration_of,
+    draw_robot_error,
+    observe_demonstration,
+    predicted_outcome,
+    range_sensor,
+    reobservations_of,
+    replay_and_judge,
+    scene_of,
+    stream,
+    stream_key,
+    trial_outcome,
+)
+
+Callbacks = Hooks | Callable[[Any], None]
+"""Called with the `MjData` of a replay about every 20 ms of simulated time; or several hooks."""
+MEASURED: TrialRecord = {"noise_mm": None, "noise_deg": None, "human_error_scale": None, "noise": "measured"}
+"""Columns of a trial whose observation comes from a file."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RunContext:
+    """What all steps of one trial share."""
+
+    scene: Scene
+    config: TrialConfig
+    corrector: Any
+    """The part of the method that makes the plan: a name or the corrector itself."""
+    callbacks: Callbacks | None = None
+    cache: ReplayCache | None = None
+    """What replays of one scene and seed have in common; it changes nothing but the time they take."""
+
+
+@check_arguments
+def run_trial(
+    config: TrialConfig | Scenario | str | Path,
+    scene: Scene | None = None,
+    *,
+    method: str | Callable[..., Any] | None = None,
+    simulated: SimulatedDemonstration | None = None,
+    content: str | None = None,
+    watch: Callbacks | None = None,
+    cache: ReplayCache | None = None,
+    **settings: Any,
+) -> TrialRecord:
+    """Run one trial, for example `run_trial("stick_in_tower", method="contact", noise_level=1, seed=7)`.
+
+    Args:
+        config: A configuration, or a scenario (name, path or object) whose settings are the keywords.
+        scene: Compiled for scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
+        method: A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)`
+            poses in the world frame, [m]. Default: that of the configuration.
+        simulated: The demonstration of this seed and human error scale. Default: simulated here.
+        content: From `content_hash`. Default: computed here.
+        watch: As `Callbacks`.
+        cache: As in `RunContext`.
+        settings: Settings of `TrialConfig` and `noise_level`, with a scenario.
+
+    Returns:
+        The record of the trial, a dict whose keys are columns.
+
+    Raises:
+        InputError: An unknown setting, a value that is not allowed, or a function that returns what it must not.
+    """
+    source: str | Scenario
+    if isinstance(config, TrialConfig):
+        require(not settings, f"{', '.join(settings)} was given together with a TrialConfig; put it into that.")
+        source = config.scenario
+    else:
+        source = config if isinstance(config, Scenario) else str(config)
+        config, loaded = configure_trial(config, **settings)
+        scene = scene or scene_of(config, loaded)
+    if method is not None:
+        config = replace(config, method=method if isinstance(method, str) else function_name(method))
+    scene = scene or scene_of(config)
+    require(
+        config.scenario == scene.scenario.name or config.scenario not in scenario_names(),
+        f"the settings name the scenario '{config.scenario}', the scene is of '{scene.scenario.name}'; build the "
+        "scene of the same scenario, or leave it out.",
+    )
+    simulated = simulated or demonstration_of(config, scene)
+    content = content or content_hash(scene.scenario, source, scene.arm.files)
+    record = start_record(config, scene.scenario, config_hash(config, content))
+    record |= {"demonstration": simulated.demonstration.code}
+    if simulated.demonstration.code != "ok":
+        return record | end_record(demonstration_failure(simulated.demonstration), success=None)
+    truth = simulated.layout.poses
+    noise = noise_of(config, scene, simulated)
+    observation = observe_demonstration(simulated, noise, config.seed, config.secret_seed)
+    given = _choose_contacts(config, observation, truth)
+    reobserve = reobservations_of(
+        simulated, noise, config.seed, config.max_reobservations, config.secret_seed, given.assembly
+    )
+    corrector = method if callable(method) else parse_method(config.method).corrector
+    context = RunContext(scene, config, corrector, watch, cache)
+    return record | _plan_and_replay(context, observation, given, truth, reobserve)
+
+
+def run_measured(
+    settings: TrialConfig, scene: Scene, observation: Observation, text: str, *, watch: Any = None
+) -> TrialRecord:
+    """Replay an observation from a file, whose truth is not known.
+
+    The judge compares overlaps with those of the scenario's nominal poses, moved to where the first part was observed.
+    Noise level, human error scale and pose errors of the record are null, its noise is `measured`.
+
+    Args:
+        text: The content of the file, for the hash.
+
+    Raises:
+        InputError: The method is `oracle`, which needs the truth.
+    """
+    require(
+        not knows_truth(settings.method),
+        f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use "
+        "uncorrected or paper.",
+    )
+    content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
+    record = start_record(settings, scene.scenario, config_hash(settings, content, text))
+    record |= MEASURED | {"demonstration": "ok"}
+    context = RunContext(scene, settings, parse_method(settings.method).corrector, watch)
+    return record | _plan_and_replay(context, observation, _choose_contacts(settings, observation, None), None, None)
+
+
+def _plan_and_replay(
+    context: RunContext,
+    observation: Observation,
+    given: Observation,
+    truth: Array | None,
+    reobserve: Reobservations | None,
+) -> TrialRecord:
+    """Correct, fit, predict, execute and judge.
+
+    Args:
+        observation: With the true contacts.
+        given: The same with the contacts that the corrector gets.
+        truth: (n, 4, 4) poses of the layout, world frame, [m]; None if they are not known.
+    """
+    config = context.config
+    planned = apply_method(context.corrector, given, truth, reobserve, context.scene)
+    if planned.plan is None:
+        assert planned.failure is not None
+        record = end_record(planned.failure, success=False)
+    else:
+        _, spiral, probe = parse_method(config.method)
+        predicted_success = predict_success(
+            planned.plan, given, planned.correction, context.scene, config.robot_error, spiral, probe
+        )
+        prediction = predicted_outcome(planned.plan, context.scene, spiral)
+        if predicted_success < config.min_predicted_success:
+            record = end_record(abstain(predicted_success, config.min_predicted_success), success=False)
+        else:
+            # a plan states poses; the contacts that these make are the true ones
+            record = _replay(context, replace(planned.plan, assembly=observation.assembly), observation, truth)
+        record |= {"failure_prediction": prediction, "predicted_success": predicted_success}
+    record |= method_columns(planned) | confidence_columns(planned, observation, given, truth)
+    if planned.correction is not None:
+        record |= {"reobservations": reobserve.reobservations if reobserve else 0}
+    if uses_contacts(config.method):
+        record |= cast(TrialRecord, count_contacts(observation.assembly, given.assembly))
+    return record
+
+
+def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Array | None) -> TrialRecord:
+    """Execute a plan and judge what it reached, with the nominal poses in place of a truth that is not known."""
+    config = context.config
+    scene = context.scene
+    reference = move_nominal_poses(scene.scenario.goals, observation) if truth is None else truth
+    _, spiral, probe = parse_method(config.method)
+    error = draw_robot_error(config.robot_error, scene, config.seed, config.secret_seed)
+    probing = None
+    if probe:
+        assumed = assumed_error(config.assumed_robot_error, config.robot_error)
+        key = stream_key(config.seed, WRENCH, config.secret_seed)
+        probing = probing_config(plan, scene, assumed, key, config.ft_sensor)
+    execution = ExecutionConfig(config.fidelity, spiral, robot_error=error, probing=probing)
+    attempt = replay_and_judge(plan, scene, reference, context.callbacks, execution, context.cache)
+    end = end_record(trial_outcome(attempt), success=attempt.verdict.success)
+    return end | {"joint_control": scene.arm.control} | replay_columns(attempt, plan, truth)
+
+
+def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array | None) -> Observation:
+    """The observation as a corrector gets it: with the given, detected or wrong contacts of `contact_source`."""
+    if not uses_contacts(config.method):
+        return observation
+    if config.contact_source in DETECTED:
+        return with_detected_contacts(observation, config.contact_source)
+    if truth is None:
+        return observation
+    rng = stream(config.seed, CONTACT_SOURCE, config.secret_seed)
+    return with_contacts(observation, make_contacts(config.contact_source), truth, rng)
+
+
+def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
+    """The noise model of a trial, or the depth camera that recorded its demonstration."""
+    if settings.pose_source == DEPTH_CAMERA:
+        return range_sensor(scene, simulated, settings.noise_mm)
+    return make_noise(settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
+
+
+def probing_config(
+    plan: Plan,
+    scene: Scene,
+    assumed: str | None,
+    seed: tuple[int, ...],
+    ft_sensor: str = USUAL_FT_SENSOR,
+    actions: tuple[str, ...] = PROBING_ACTIONS,
+) -> ProbingConfig:
+    """How a robot probes: with assumed standard deviations of its errors, never with the errors themselves.
+
+    Args:
+        assumed: Standard deviations, as in a record; None: usual ones.
+        seed: Of the noise of the force-torque sensor.
+        ft_sensor: As in a record.
+        actions: Of `PROBING_ACTIONS`.
+
+    Raises:
+        InputError: An unknown kind of error, or a number that is not allowed.
+    """
+    sigmas = UNKNOWN if assumed is None else robot_sigmas(assumed)
+    estimate = prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
+    return ProbingConfig(estimate, slip_sigmas(sigmas), seed, ft_sensor, actions)
+
+
+def record_trial(
+    config: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any
+) -> TrialRecord:
+    """The record of a trial, also of one whose corrector misbehaves, or returns what no record can hold.
+
+    Args:
+        more: Further arguments of `run_trial`.
+
+    Raises:
+        InputError: A setting is not allowed.
+    """
+    try:
+        record = run_trial(config, scene, simulated=simulated, content=content, **more)
+        wrong = unwritable(record) if ":" in config.method else ""
+        if not wrong:
+            return record
+        why = f"the corrector '{config.method}' returned what no record can hold ({wrong})"
+    except CorrectorMisbehaved as error:
+        why = str(error)
+    return record_misbehaviour(config, content, simulated.demonstration.code, why)

@@ -1,1 +1,0 @@
-"""What `python benchmarks/corrector.py` measures, one idea per file."""

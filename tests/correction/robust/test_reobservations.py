@@ -1,0 +1,114 @@
+"""Looking again: what is asked for, and what comes of several views of one operation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench import InputError, correct
+from apo_bench.assembly import OutlierModel
+from apo_bench.correction.robust.beliefs import GROSS, INLIER
+from apo_bench.correction.robust.views import beliefs, merged, views_of
+from apo_bench.geometry import pose
+from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
+
+MODEL = OutlierModel()
+
+
+class Again:
+    """Looks that were taken beforehand; it keeps what was asked for."""
+
+    def __init__(self, *observations):
+        self.observations = list(observations)
+        self.asked = []
+
+    @property
+    def left(self):
+        return len(self.observations)
+
+    def __call__(self, operations):
+        self.asked.append(tuple(operations))
+        made = self.observations.pop(0)
+        return replace(made, observed=made.observed & np.isin(np.arange(len(made.observed)), operations))
+
+
+def fresh(name, seed, number):
+    return look(name, seed + 100 * (number + 1))
+
+
+def at_the_same_place(name, seed, number):
+    """Another look at the demonstration of `look(name, seed)`."""
+    first = shown(name, seed)[2]
+    other = shown(name, seed + 100 * (number + 1))[2]
+    twists = pose.log(pose.inverse(other.poses) @ fresh(name, seed, number).poses)
+    return replace(look(name, seed), poses=first.poses @ pose.exp(twists))
+
+
+def test_where_nothing_is_in_doubt_nobody_asks():
+    again = Again(at_the_same_place("vanished_fixture", 1, 0))
+    observation = look("vanished_fixture", 1)
+    assert (
+        correct(observation, "contact-robust", again).poses.tolist() == correct(observation, "contact").poses.tolist()
+    )
+    assert again.asked == []
+
+
+def test_what_was_left_out_is_looked_at_again_until_it_is_right():
+    """The second view of operation 2 is as wrong as the first."""
+    name = "carried_bridge"
+    k = 1
+    second = astray(at_the_same_place(name, 2, 0), k, seed=9)
+    again = Again(second, at_the_same_place(name, 2, 1), at_the_same_place(name, 2, 2))
+    found = correct(astray(look(name, 2), k), "contact-robust", again)
+    assert found.ok
+    assert all(k in asked for asked in again.asked)
+    assert len(again.asked) == 2
+    assert found.left_out == ()
+    assert "looked again at operation" in found.sentence
+    assert_allclose(found.poses[k][:3, 3], shown(name, 2)[2].poses[k][:3, 3], atol=5e-3)
+    assert fixed_error_mm(name, 2, found) < 0.35
+
+
+def test_an_operation_of_which_nothing_is_told_is_asked_for():
+    observation = look("block_on_block", 0)
+    operations = [replace(one, contacts=()) for one in observation.assembly.operations]
+    lonely = replace(observation, assembly=replace(observation.assembly, operations=tuple(operations)))
+    missed = replace(lonely, observed=np.array([False, True]))
+    again = Again(replace(at_the_same_place("block_on_block", 0, 0), assembly=lonely.assembly))
+    assert correct(missed, "contact-robust", again).ok
+    assert again.asked == [(0,)]
+    assert correct(missed, "contact-robust", Again()).status == "not_seen"
+
+
+def test_a_corrector_that_does_not_ask_gets_nothing():
+    observation = astray(look("block_on_block", 1), 1)
+    again = Again(at_the_same_place("block_on_block", 1, 0))
+    for corrector in ("contact", lambda seen: seen.poses):
+        correct(observation, corrector, again)
+    assert again.asked == []
+
+
+def test_views_that_agree_are_merged_and_believed():
+    one, other = (views_of(at_the_same_place("carried_bridge", 4, i))[0][0] for i in range(2))
+    both = merged((one, other), (INLIER, INLIER), MODEL)
+    assert_allclose(both.covariance, one.covariance / 2, rtol=1e-9)
+    middle = one.goal @ pose.exp(pose.log(pose.inverse(one.goal) @ other.goal) / 2)
+    assert_allclose(both.goal, middle, atol=1e-6)
+    assert beliefs((one, other), MODEL)[0][1] == (INLIER, INLIER)
+    alone = merged((one, other), (INLIER, GROSS), MODEL)
+    assert alone.surprise - both.surprise > 20.0
+
+
+def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
+    one = views_of(look("carried_bridge", 4))[0][0]
+    other = one._replace(goal=one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    independent = OutlierModel(repeat=0.0)
+    assert [state for _, state in beliefs((one, other), independent)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
+    many = beliefs((one, other, one, one, other, one), MODEL)
+    assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)
+
+
+def test_anything_but_a_reobserver_is_refused():
+    with pytest.raises(InputError, match="reobserve of correct must be a Reobserver or None"):
+        correct(look("block_on_block", 1), "contact-robust", 2)
