@@ -143,7 +143,7 @@ def _best_choices(
             rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
             raise NoOrder(
                 f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
-                f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on, and none of these "
+                f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on; none of these "
                 "follows the others; check the ids in the objects file and that the log begins before the first part "
                 "is taken, or state --ends, or --unseen for operations that the log does not show."
             )
