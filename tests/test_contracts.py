@@ -87,7 +87,7 @@ BREACHES = {
     ],
     "importers-used": [
         ("apo_bench.trial.run", "apo_bench.importers.recording.importing"),
-        ("apo_bench.viz.card", "apo_bench.importers.assembly.new_scenario"),
+        ("apo_bench.viz.task_sheet", "apo_bench.importers.assembly.new_scenario"),
         ("apo_bench.scenario.file", "apo_bench.importers.cad.importing"),
     ],
     "report": [

@@ -45,7 +45,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"inspect depth ": "many depth images; tests/depth_camera runs them",
     r"(view |run .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
-    r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
+    r"assembly import .*\.step ": "needs the extra cad; tests/cad runs it",
     r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; tests/cad reads such files",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",

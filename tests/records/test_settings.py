@@ -16,7 +16,7 @@ from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
-from apo_bench.cli.setting_options import sweep_options, trial_options
+from apo_bench.cli.shared.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import (
     KEY,

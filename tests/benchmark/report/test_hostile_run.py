@@ -15,7 +15,7 @@ from apo_bench import InputError
 from apo_bench.benchmark.analysis import tally
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
-from apo_bench.cli.terminal import print_cells
+from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
 from apo_bench.records.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command
@@ -114,7 +114,7 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
     assert all(evil in pages.lines(page) for evil in DANGEROUS)
     assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 0
     assert "<script>alert" not in (tmp_path / "made" / "compare.html").read_text(encoding="utf-8")
-    print_cells(tally(rows))
+    print_rates(tally(rows))
     assert "[/red]" in capsys.readouterr().out
 
 
@@ -127,7 +127,7 @@ def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_
 
 def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert clean("a\x1b[2J\nb\x07\x9b\u202e\ud800é") == "a\\x1b[2J\\nb\\x07\\x9b\\u202e\\ud800é"
-    print_cells(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
+    print_rates(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
     assert cli.main(["report", str(tmp_path / "no\x1b[31mwhere")]) == 2
     said = capsys.readouterr()
     for text in (said.out, said.err):
@@ -137,11 +137,12 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
-    from apo_bench.cli.trial_text import print_row
+    from apo_bench.cli.shared import print_columns
     from apo_bench.trial.endings import end_record
+    from apo_bench.viz.trial_text import summary_lines
 
     end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
-    print_row(row("contact", 0, False, pose_source="noise-model") | end)
+    print_columns(summary_lines(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])

@@ -16,7 +16,6 @@ import pytest
 
 from apo_bench.benchmark.report.report import Report, report
 from apo_bench.cli.app import main
-from apo_bench.cli.terminal import print_report
 from apo_bench.errors import InputError
 from apo_bench.io import write_columns
 from tests import pages
@@ -243,8 +242,8 @@ def test_without_pyarrow_tables_are_csv_alone_and_it_is_said(
     assert {path.suffix for path in (tmp_path / "run" / "tables").iterdir()} == {".csv"}
     assert {path.name: path.read_bytes() for path in made.tables.values()} == kept
     assert ".parquet" not in made.page.read_text(encoding="utf-8")
-    print_report(made)
-    assert "as .parquet too with the package pyarrow" in " ".join(capsys.readouterr().out.split())
+    assert main(["report", str(tmp_path / "run"), "--pictures", "0"]) == 0
+    assert ".parquet needs the package pyarrow" in capsys.readouterr().out
     with pytest.raises(InputError, match="a Parquet table needs the package pyarrow; install it with: pip install"):
         write_columns(["a"], [[1]], tmp_path / "a.parquet")
 

@@ -216,11 +216,11 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
         '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\ncolor = [0.2, 0.4, 0.6]\n',
         encoding="utf-8",
     )
-    asked = ["scenario", "new", "--parts", "block", "--poses", str(poses), "--fixed", "lower", "--out", str(out)]
+    asked = ["scenario", "new", "block", "--poses", str(poses), "--fixed", "lower", "--out", str(out)]
     assert main(asked) == 0
     assert "1. upper comes from above, onto lower: 1 contacts" in capsys.readouterr().out
     assert main(asked) == 2
-    assert "is there already, maybe with changes by hand" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
     assert main([*asked, "--overwrite"]) == 0
     capsys.readouterr()
     text = out.read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
