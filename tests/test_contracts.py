@@ -93,7 +93,7 @@ BREACHES = {
     "report": [
         ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.comparison.text"),
         ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.answer"),
-        ("apo_bench.benchmark.report.tables.cells", "apo_bench.benchmark.report.facts"),
+        ("apo_bench.benchmark.report.tables.conditions", "apo_bench.benchmark.report.facts"),
         ("apo_bench.benchmark.report.figures.figures", "apo_bench.benchmark.report.page.report_page"),
     ],
     "statistics": [

@@ -25,12 +25,10 @@ from apo_bench.simulation.robot import (
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
-_TABLE_M = 0.03
-_TURNS = (-1.2, 0.0, 1.2)
-"""Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
-_PUSH_N = 5.0
-_PUSH_S = 0.5
-"""Stiffness is looked at by this push, which lasts so long."""
+_TABLE_M = 0.03  # height of the tip over the table
+_TURNS = (-1.2, 0.0, 1.2)  # turns about the vertical from home, [rad], at which the table is to be reached
+_PUSH_N = 5.0  # stiffness is measured by this push
+_PUSH_S = 0.5  # which lasts so long
 _LAYOUTS = 20
 _LEAST_FORCE_N = 10.0
 """Of each pad: below it parts slip."""

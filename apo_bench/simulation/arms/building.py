@@ -24,14 +24,13 @@ from apo_bench.simulation.arms.stated import model_files, speed_limits, stated_a
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
-_FINGER_ARMATURE = 1e-4
-_FINGER_DAMPING = 0.02
-"""Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
-_COUPLED_SOLREF = (0.004, 1.0)
-_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)
-_UNSAID_SOLREF = (0.02, 1.0)
-"""Fingers that are coupled as softly as MuJoCo has it by default give way by 1 mm to some newtons; they get
-the first two, which the grippers that come with the benchmark have."""
+_FINGER_ARMATURE = (
+    1e-4  # [kg m^2], of finger joints that are neither damped nor geared: light links would rattle for ever
+)
+_FINGER_DAMPING = 0.02  # [Nm s/rad], of the same
+_COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
+_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
+_UNSAID_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they give way by 1 mm to some newtons
 _USUAL_FINGERS_MM_S = 50.0
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
