@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from apo_bench.benchmark.analysis import Cell, HalfLevel, Paired
-from apo_bench.benchmark.report.tables.table import Column, Table, endings, interval_columns, place_columns
+from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, Paired
+from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, endings, interval_columns
 from apo_bench.records import TrialConfig
 
 _AXES = (
@@ -18,7 +18,7 @@ _AXES = (
 """Shown to people where they are not as usual in some cell."""
 
 
-def cell_table(cells: Sequence[Cell]) -> Table:
+def condition_table(cells: Sequence[ConditionResult]) -> Table:
     """Axes that are as usual in every cell are left to files."""
     unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
     min_predicted_success = "min_predicted_success" in unusual
@@ -69,7 +69,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
     )
 
 
-def _all_endings(cell: Cell) -> str:
+def _all_endings(cell: ConditionResult) -> str:
     return endings(cell.failures, most=None)
 
 
@@ -78,7 +78,7 @@ def pair_table(pairs: Sequence[Paired]) -> Table:
     return Table(
         pairs,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("reference", "against", words=True),
             Column("pairs", "pairs"),
             Column("only_method"),
@@ -120,16 +120,14 @@ def pair_table(pairs: Sequence[Paired]) -> Table:
             ),
             *interval_columns("free_interval", "free_low_95_mm", "free_high_95_mm"),
         ),
-        "No method shares a cell with `none` or `paper`, with which methods are paired.",
+        "No method shares a condition with `uncorrected` or `paper`, with which methods are paired.",
         (
-            "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference "
-            "of their success rates in points with Tango's score interval for paired proportions; McNemar's exact "
-            "p-value, and in brackets the same adjusted for all comparisons of the sweep (Holm); *recovered*, the "
-            "share of the seeds at which the other failed that it mended; *harmed*, the share of the seeds at which "
-            "the other was right that it spoilt; and the mean difference of the errors of their planned goals in "
-            "directions that contacts leave free, over seeds at which both had a plan, with Student's t interval "
-            "(intervals are of 95 %). Negative errors are smaller than the other's. With no discordant pair an "
-            "interval still reaches 384 / (n + 3.84) points to both sides: below 3 from 125 on."
+            "Over the same seeds: at how many of them both methods succeeded, one alone, or neither; the difference of "
+            "their success rates in points with Tango's score interval for paired proportions; McNemar's exact "
+            "p-value, and in brackets the same adjusted for all comparisons of the sweep (Holm). *Recovered* is the "
+            "share of the other's failures at which the method succeeded, *harmed* the share of the other's successes "
+            "at which it failed. The last column has the mean difference of the errors of planned poses in directions "
+            "that contacts leave free, with Student's t interval. All intervals are of 95 %."
         ),
     )
 
@@ -139,18 +137,18 @@ def half_table(levels: Sequence[HalfLevel]) -> Table:
     return Table(
         levels,
         (
-            *place_columns(levels=False),
+            *condition_columns(levels=False),
             Column("smallest_level", value="smallest"),
             Column("largest_level", value="largest"),
             Column("trials", "n"),
-            Column("half_level", "half success at level", "noise_mm", "{text}"),
+            Column("half_level", "half success at noise level", "noise_mm", "{text}"),
             Column("surely_over", "surely", text="{sure_text}"),
             Column("surely_under"),
         ),
-        "No level varied, so nothing is known of how success falls with it.",
+        "The noise level did not vary.",
         (
-            "Where success falls to one half, read along the logarithm of the level; *surely* is from the last level "
-            "with success surely over one half to the first surely under it, whatever the curve between them (exact "
-            "binomial tests, 95 %); *any* where neither is known."
+            "The noise level at which success falls to one half, read along its logarithm. *Surely* is from the last "
+            "level with success surely over one half to the first surely under it, whatever the curve between them "
+            "(exact binomial tests, 95 %); *any* where neither is known."
         ),
     )

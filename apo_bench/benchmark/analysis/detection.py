@@ -1,4 +1,4 @@
-"""Contacts that were recognised in observations, against those of the scenario."""
+"""Detected contacts against those of the scenario."""
 
 from typing import Any
 
@@ -12,17 +12,17 @@ from apo_bench.records.run.trials import Trials, trials_of
 _AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_mm", "noise_deg")
 
 
-def recognitions(records: Records) -> list[Line]:
-    """One line per scenario, noise, eye, way of recognising, carelessness and level; and over all scenarios.
+def detections(records: Records) -> list[Line]:
+    """One line per scenario, noise, pose and contact source, human error scale and noise level; and over all scenarios.
 
-    Methods of one seed were told the same, so each observation counts once. Complete is a demonstration of which every
-    contact was recognised, and no other.
+    Methods of one seed get the same contacts, so each observation counts once. A demonstration is complete if exactly
+    its contacts were detected.
     """
     trials = trials_of(records)
     known = ~np.isnan(trials.number("contacts_true_positive")) & ~np.isnan(trials.number("noise_mm"))
-    told = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
-    observations = told.groups((*_AXES, "seed", "clearance_mm")).of
-    once = told.where(np.unique(observations, return_index=True)[1])
+    detected = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
+    observations = detected.groups((*_AXES, "seed", "clearance_mm")).of
+    once = detected.where(np.unique(observations, return_index=True)[1])
     parts = once.parts(_AXES)
     if len(once.distinct("scenario")) > 1:
         parts |= {(ALL, *key): own for key, own in once.parts(_AXES[1:]).items()}
@@ -45,6 +45,6 @@ def _line(axes: Line, trials: Trials) -> Line:
 
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
-    """All scenarios last; the ways of recognising in their own order."""
+    """All scenarios last; contact sources in their own order."""
     scenario, noise, pose_source, contact_source, *rest = key
     return (scenario == ALL, scenario, noise, pose_source, DETECTED.index(contact_source), *rest)

@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Cell, Place, by_place, level_of, level_unit, levels_of, noise_words
+from apo_bench.benchmark.analysis import (
+    Condition,
+    ConditionResult,
+    by_condition,
+    level_of,
+    level_unit,
+    levels_of,
+    noise_words,
+)
 from apo_bench.benchmark.report.trials import NUMBERS, predicted, verdict, why
 from apo_bench.io import grouped
 from apo_bench.records import Limits, knows_truth
@@ -27,7 +35,7 @@ class Button(NamedTuple):
 
     number: int
     """Among all cells."""
-    cell: Cell
+    cell: ConditionResult
     span: int
     """Levels that it holds for: the oracle meets none, so it stands for all."""
 
@@ -43,19 +51,19 @@ class Matrix(NamedTuple):
     """Method, and its cells; None where a level was not run."""
 
 
-def matrix(setting: Place, cells: Sequence[Cell], numbers: Mapping[Place, int]) -> Matrix:
+def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mapping[Condition, int]) -> Matrix:
     """The cells of a setting.
 
     Args:
-        numbers: Cell's place -> its number among all cells.
+        numbers: Condition -> its number among all cells.
     """
     levels = levels_of(cells)
     lines: list[tuple[str, list[Button | None]]] = []
     for method, own in grouped((c.method, c) for c in cells).items():
-        by_level = {level_of(c): Button(numbers[c.place], c, 1) for c in own}
+        by_level = {level_of(c): Button(numbers[c.condition], c, 1) for c in own}
         across = [by_level.get(level) for level in levels]
         if knows_truth(method):
-            across = [Button(numbers[c.place], c, max(1, len(levels))) for c in own]
+            across = [Button(numbers[c.condition], c, max(1, len(levels))) for c in own]
         lines.append((method, across))
     corner = f"method, {level_unit(setting.noise)}" if levels else "method"
     return Matrix(setting.title, corner, [noise_words(x, setting.noise) for x in levels] or ["any"], lines)
@@ -67,7 +75,7 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
     Args:
         pictures: `cell:seed` -> number of the picture of that trial.
     """
-    cells = by_place(trials).values()
+    cells = by_condition(trials).values()
     words: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "verdict": verdict,
         "why": why,
