@@ -36,7 +36,7 @@ _MEASURED = (
         "planned error",
         "{planned_error_fixed_mm:.3f} mm fixed by contacts, {planned_error_free_mm:.3f} mm free",
     ),
-    ("sim_time_s", "peak force", "{peak_force_n:.1f} N in {sim_seconds:.1f} simulated seconds"),
+    ("sim_time_s", "peak force", "{peak_force_n:.1f} N in {sim_time_s:.1f} simulated seconds"),
     (
         "touches",
         "felt",
