@@ -50,7 +50,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"scenario check ": "trials of seconds each; tests/importers/assembly runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/benchmark/scoring runs small ones",
     r"noise show ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
-    r"run stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; replays of other pages run",
+    r"run stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; other pages replay",
 }
 """Commands that are not run, by how they begin, and why."""
 
