@@ -26,17 +26,17 @@ SHORT = (
     *("--method", "uncorrected,mine:correct", "--workers", "2"),
 )
 COMMANDS = """
-graph block_on_block --out graph.png
-show block_on_block --noise-level 1 --out show.png
-explain block_on_block
-noise card isotropic
-recognise block_on_block
-plan block_on_block
-scene block_on_block --out scene.xml
-scenario card block_on_block
+inspect graph block_on_block --out graph.png
+inspect poses block_on_block --noise-level 1 --out show.png
+inspect dof block_on_block
+noise show isotropic
+detect-contacts block_on_block
+inspect plan block_on_block
+inspect scene block_on_block --out scene.xml
+scenario show block_on_block
 arm list
 part import a.step --out parts
-eye block_on_block
+inspect depth block_on_block
 view block_on_block
 report run --pictures 1 --trust-code
 compare run run

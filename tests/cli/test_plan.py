@@ -13,12 +13,13 @@ from apo_bench import InputError, Plan, Scenario, build_scene, draw_layout, load
 from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
+from apo_bench.io import direction
 from apo_bench.planning.insertion.arrival import understand
 from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import nominal_start
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.viz.plan_text import direction, plan_lines, plan_lines_form, plan_text
+from apo_bench.viz.plan_text import plan_form, plan_lines, plan_text
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]
@@ -126,7 +127,7 @@ def test_the_table_covers_every_scenario() -> None:
 @pytest.mark.parametrize("name", TABLE)
 def test_states_and_macros_of_every_operation(name: str) -> None:
     scenario = load_scenario(name)
-    form = plan_lines_form(plan_lines(nominal(scenario), scenario), scenario)
+    form = plan_form(plan_lines(nominal(scenario), scenario), scenario)
     found = [
         (
             f"{step['before']['letter']} -> {step['after']['letter']}",
@@ -198,7 +199,7 @@ def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     hole = '["py", "cube.hpy"], ["ny", "cube.hny"], ["pz", "cube.hpz"], ["nz", "cube.hnz"]'
     for at, more, words in (
         (135, ', ["px", "a.nx"], ["nx", "b.px"]', "operation 1 (stick): locked"),
-        (180, "", "operation 1 (stick): no free way in"),
+        (180, "", "operation 1 (stick): no free insertion axis"),
     ):
         path = tmp_path / "own.toml"
         operation = f'[[operations]]\nmove = "stick"\ngoal = {{ at_mm = [0, 0, 25] }}\ncontacts = [{hole}{more}]\n'
@@ -252,7 +253,7 @@ def test_undoing_reverses_the_macros() -> None:
         ("move-to-contact", "-z"),
         ("slide-to-contact", "-y"),
     ]
-    assert (cube.came_from, cube.back_to, cube.goal) == ("T4", "T2", None)
+    assert (cube.came_from, cube.back_to, cube.target) == ("T4", "T2", None)
 
 
 TOWER = (ROOT / "scenarios" / "stick_in_tower.toml").read_text(encoding="utf-8")
@@ -325,15 +326,15 @@ def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
     found = json.loads(out.read_text(encoding="utf-8"))
     assert found["poses"]["quaternion"] == "wxyz"
     assert [step["part"] for step in found["steps"]] == ["castle1", "castle2", "stick"]
-    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames), "--acts", "cobot"]) == 0
-    with_acts = json.loads(out.read_text(encoding="utf-8"))
-    assert with_acts.pop("acts")["sensor"]["noise_n"] == 3.5
-    assert with_acts == found
+    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames), "--probing", "joint-torque"]) == 0
+    with_probing = json.loads(out.read_text(encoding="utf-8"))
+    assert with_probing.pop("probing")["sensor"]["noise_n"] == 3.5
+    assert with_probing == found
     capsys.readouterr()
     for wrong, sentence in (
-        (["inspect", "plan", "stick_in_tower", "--robot", str(out)], "--robot was given without --observation"),
-        ([*seen, "--frames", str(frames)], "was given without --robot"),
-        ([*seen, "--acts", "external"], "--acts external was given without --robot"),
+        (["inspect", "plan", "stick_in_tower", "--robot", str(out)], "--robot needs --observation"),
+        ([*seen, "--frames", str(frames)], "--frames needs --robot"),
+        ([*seen, "--probing", "wrist"], "--probing needs --robot"),
     ):
         assert cli.main(wrong) == 2
         assert sentence in capsys.readouterr().err

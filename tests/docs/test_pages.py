@@ -45,7 +45,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"inspect depth ": "many depth images; tests/perception/depth_camera runs them",
     r"(view |run .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
     r"part import ": "needs a CAD file; tests/importers/cad runs it",
-    r"scenario new .*\.step ": "needs the extra cad; tests/importers/cad runs it",
+    r"assembly import .*\.step ": "needs the extra cad; tests/importers/cad runs it",
     r"recording import tracker|(correct|inspect plan|run) clamp": "needs STEP files; tests/importers reads such files",
     r"scenario check ": "trials of seconds each; tests/importers/assembly runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/benchmark/scoring runs small ones",

@@ -28,9 +28,9 @@ _OVER_M = 0.003
 """The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
 _APART_M = 0.01
 """Places that are less far apart determine a tilt no better than feet do."""
-_ROOM_M = 0.001
-_STEP_M = 0.002
-_LOOKS_M = 0.004
+_ROOM_M = 0.001  # everything else stays so far away
+_STEP_M = 0.002  # places along the wall are so far apart
+_LOOKS_M = 0.004  # room is checked so often on the way down
 
 
 class SideTouch(NamedTuple):

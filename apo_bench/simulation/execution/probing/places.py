@@ -23,18 +23,17 @@ OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
 ROOM_M = 0.003
 """Everything else stays so far away."""
-_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
-_ANGLES = 24
+_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)  # of the rings around the goals on which the floor is touched
+_ANGLES = 24  # places of a ring
 _PATCH_M = 0.025
 """The hand touches a floor that is whole so far around."""
 _SLACK = 3
 """Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
-_END_M = 1e-4
+_END_M = 1e-4  # shapes that end within this of the farthest end touch
 _OVER_M = 0.003
 """A wall is touched so high over its foot, with the lowest part of the fingers."""
-_LIFT_M = 0.12
-_LOOKS_M = 0.004
-"""The hand comes straight down from so far above; it is looked at so often."""
+_LIFT_M = 0.12  # the hand comes straight down from so far above
+_LOOKS_M = 0.004  # its room is checked so often
 
 
 StandOff = Callable[[Array, Array], float]
