@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import typer
 from rich.table import Table as TerminalTable
 
-from apo_bench.benchmark.analysis import Cell, confusions
-from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.analysis import ConditionResult, confusions
+from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
 from apo_bench.benchmark.report.tables.table import Table
 from apo_bench.cli.shared import print_table
@@ -24,9 +24,9 @@ def print_report_table(table: Table) -> None:
     print_table(printed)
 
 
-def print_rates(cells: Sequence[Cell]) -> None:
+def print_rates(cells: Sequence[ConditionResult]) -> None:
     """Print success rates with their intervals, and how many trials do not count."""
-    print_report_table(cell_table(cells))
+    print_report_table(condition_table(cells))
     if excluded := sum(cell.excluded for cell in cells):
         typer.echo(f"Trials that do not count, because the demonstration itself failed: {excluded:,}.")
 

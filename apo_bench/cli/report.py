@@ -31,13 +31,13 @@ def report_command(
     from apo_bench.viz.failure_pictures import failure_pictures
 
     made = report(folder, pictures, secret_seed_file, trust_code=trust_code, draw=failure_pictures)
-    print_rates(made.cells)
+    print_rates(made.conditions)
     endings = ".csv and .parquet" if has_parquet() else ".csv (.parquet needs the package pyarrow)"
     lines = [
         prediction_summary(made.confusions[-1]),
         *([f"Failures that were not drawn: {'; '.join(made.no_pictures)}."] if made.no_pictures else []),
         f"Answer:  {made.answer.replace('`', '')}",
-        f"Tables:  {made.tables['cells']} and {len(made.tables) - 1} more, as {endings}",
+        f"Tables:  {made.tables['conditions']} and {len(made.tables) - 1} more, as {endings}",
         *(f"Figures: {figure} and {len(made.figures) - 1} more" for figure in made.figures[:1]),
         f"Report:  {made.page}",
     ]

@@ -57,7 +57,7 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
         InputError: A setting that is not allowed.
         RuntimeError: The demonstration itself failed.
     """
-    check("noise_mm", noise_mm, DEPTH_CAMERA)
+    check("noise_mm", noise_mm)
     check("human_error_scale", human_error_scale)
     check("seed", seed)
     scene = build_scene(load_scenario(scenario))

