@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.viz.sensor import run_sensor
-from apo_bench.viz.sensor_picture import draw_sensor
+from apo_bench.viz.depth_run import run_depth_camera
+from apo_bench.viz.depth_picture import draw_depth
 
 HERE = Path(__file__).parent
 SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}
@@ -14,7 +14,7 @@ SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}
 
 def main() -> None:
     for scenario, seed in SHOWN.items():
-        draw_sensor(run_sensor(scenario, 1.0, seed, 1.0), HERE / "pictures" / f"depth_{scenario}.png")
+        draw_depth(run_depth_camera(scenario, 1.0, seed, 1.0), HERE / "pictures" / f"depth_{scenario}.png")
 
 
 if __name__ == "__main__":

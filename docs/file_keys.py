@@ -16,7 +16,7 @@ from fields import sentences
 
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED
 from apo_bench.benchmark.sweeps.sweep_file import SweepTable
-from apo_bench.cli.setting_options import shown_default
+from apo_bench.cli.shared.setting_options import shown_default
 from apo_bench.importers.assembly.writing import THRESHOLDS
 from apo_bench.perception.observation import noise_file
 from apo_bench.records import SETTINGS, SettingInfo

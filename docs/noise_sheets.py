@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.viz.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
+from apo_bench.viz.noise_sheet import SCENARIO, draw_errors, list_models, noise_sheet, nominal_demonstration
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"
@@ -94,7 +94,7 @@ def main() -> None:
             "",
             f'<a id="{name}"></a>',
             "",
-            write_card(name, NOISE_LEVEL, draw_errors(name, NOISE_LEVEL), 2).rstrip(),
+            noise_sheet(name, NOISE_LEVEL, draw_errors(name, NOISE_LEVEL), 2).rstrip(),
         ]
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

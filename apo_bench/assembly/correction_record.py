@@ -85,7 +85,7 @@ class Consistency:
 @copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One explanation of the observation: what of it is taken as right, how likely that is, and the poses that follow."""
+    """One explanation of the observation: what of it is taken as right, how likely that is, and its poses."""
 
     weight: float
     """Probability; what all those of a correction leave to 1 is that of none of them."""

@@ -76,9 +76,9 @@ def test_a_function_without_a_module_stays_in_this_process() -> None:
     ("wrong", "said"),
     [
         ({"scenario": "no_such"}, "no_such"),
-        ({"noise_level": -1}, "noise level of -1"),
+        ({"noise_level": -1}, "noise level must be a number from 0 to 50, got -1"),
         ({"noise_lvl": 1}, "noise_lvl"),
-        ({"seeds": 0}, "0 trials were given"),
+        ({"seeds": 0}, "trials must be a whole number from 1"),
     ],
 )
 def test_a_wrong_argument_is_one_sentence(wrong: dict[str, Any], said: str) -> None:

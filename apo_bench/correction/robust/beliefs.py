@@ -119,8 +119,8 @@ def unlikelihood(apart: Array, covariance: Array) -> float:
 
 
 def surprise(views: Sequence[Sighting], state: State, model: OutlierModel) -> float:
-    """-2 log of how likely a state of the views of one operation is, relative to inliers; and of the views, as far as that
-    does not depend on the pose."""
+    """-2 log of how likely a state of the views of one operation is, relative to inliers; and of the views, as far as
+    that does not depend on the pose."""
     total = 0.0
     for j, (view, belief) in enumerate(zip(views, state, strict=True)):
         chance = share(view, belief, model)

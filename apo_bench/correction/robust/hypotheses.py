@@ -37,8 +37,8 @@ from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
-"""Parts that are assumed to be turned by less (a standard deviation) are not far from where they were observed: no other
-start is tried, and what is far nevertheless is an outlier."""
+"""Parts that are assumed to be turned by less (a standard deviation) are not far from the observed ones: no other start
+is tried, and what is far nevertheless is an outlier."""
 UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
 """(6, 6): how far the pose of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 _WRONG_M = 0.05

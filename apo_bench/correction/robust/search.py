@@ -3,7 +3,7 @@
 While the test of `contact` holds, nothing is doubted. If it fails, the smallest sets of operations are looked for
 without which the rest agrees: a set is solved only if the contacts that none of it has a part in agree with each other
 at what was observed, which is quick to check for every set. Of the sets whose test holds the likeliest is taken. Then
-each of its states is changed for as long as that is likelier, and each relation that it has a part in may be wrong instead.
+each of its states is changed while that is likelier, and each relation that it has a part in may be wrong instead.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class Search:
         return float(weights @ [which(other) for other in known] / weights.sum())
 
     def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
-        """What was solved with how likely it is relative to the rest, the likeliest first; the unlikely ones left out."""
+        """What was solved with its weight, the likeliest first; the unlikely ones left out."""
         known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
         if not known:
             return []
@@ -151,7 +151,7 @@ class Search:
         return len(self._solved.keys() | self._expected.keys())
 
     def _solve(self, some: Iterable[tuple[States, tuple[str, ...]]], least: float = np.inf) -> list[SolvedHypothesis]:
-        """Those of some hypotheses, solved, that are not hopeless compared with this -2 log, or the likeliest of them."""
+        """Those of some hypotheses, solved, that are not hopeless compared with this -2 log."""
         some = list(some)
         assumed = dict[States, Observation]()
         for states, dropped in some:

@@ -2,7 +2,7 @@
 
 Every contact normal n, from what rests into the free side of what moves, admits the motions with n x >= 0. Directions
 in which all of them stay closed are *maintaining*, those that only open some *detaching*, all others *constraining*;
-for translations the three numbers add up to 3, which leaves ten states. Rows of six numbers (screws) work in the same way.
+for translations the three numbers add up to 3, which leaves ten states. So do rows of six numbers (screws).
 """
 
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ from apo_bench import Assembly, correct
 from apo_bench.assembly import Operation
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.gauss_newton import NearestPoses, solve_batch, nearest_poses
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses, solve_batch
 from apo_bench.geometry import Array
 from benchmarks.corrector_problems import problem
 from tests import scenes

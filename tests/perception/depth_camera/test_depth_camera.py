@@ -220,7 +220,7 @@ def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.C
     out = tmp_path / "eye.png"
     assert main(["inspect", "depth", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
     form = json.loads(capsys.readouterr().out)
-    assert form["schema"] == "apo-bench/eye/1"
+    assert form["schema"] == "apo-bench/depth/1"
     assert [operation["found"] for operation in form["operations"]] == [True, True]
     assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
@@ -313,14 +313,14 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        *(["--noise-level", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
+        *(["--noise-mm", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
     ],
 )
 def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
+        "apo_bench.viz.depth_run.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
     assert main(["inspect", "depth", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
@@ -368,5 +368,5 @@ def test_the_level_of_the_range_finder_is_one_number(noise_level: Any) -> None:
 
 @pytest.mark.parametrize("human_error_scale", [None, "much", float("nan")])
 def test_carelessness_is_a_number(human_error_scale: Any) -> None:
-    with pytest.raises(InputError, match=r"a number from 0 to 10 is allowed|careless of APOReplay must be a number"):
+    with pytest.raises(InputError, match=r"must be a number from 0 to 10|careless of APOReplay must be a number"):
         gymnasium.make("APOReplay-v0", human_error_scale=human_error_scale)

@@ -16,7 +16,7 @@ from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOO
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
 from apo_bench.perception.observation.plain import Plain
-from apo_bench.viz.noise_card import Drawn, describe_model, draw_errors, find_facts, list_models, write_card
+from apo_bench.viz.noise_sheet import ErrorSample, describe_model, draw_errors, find_facts, list_models, noise_sheet
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -151,34 +151,34 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
     """Written by `python docs/noise_sheets.py`."""
     page = (Path(__file__).parents[3] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
-    where = "as measured" if name in presets() else "at 1 mm and 1 deg"
+    where = "at 1 times the measured mm and 1 times the measured degrees" if name in presets() else "at 1 mm and 1 deg"
     assert f"{describe_model(name, 2)}\nErrors {where}, " in page
 
 
 def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
     errors = np.zeros((5, 4))
     errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 7.0]
-    text = write_card("isotropic", NOISE_LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
+    text = noise_sheet("isotropic", NOISE_LEVEL, ErrorSample(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
     across = next(line for line in text.splitlines() if line.startswith("| across"))
     assert across.split("|")[2:5] == [f"{cell:>10} " for cell in ("3.61", "3", "2")]
-    assert "5 operations of stick_in_tower; 25.0 % were not seen" in text
+    assert "5 operations of stick_in_tower; 25.0 % were not observed" in text
 
 
 @pytest.mark.parametrize(
     ("given", "noise_level", "words"),
     [
         ("flips:p=0.1", NoiseLevel(2.0, 1.0), "Errors at 2 mm and 1 deg, 30 operations"),
-        ("megapose-lmo-inliers", NOISE_LEVEL, "Errors as measured, 30 operations"),
+        ("megapose-lmo-inliers", NOISE_LEVEL, "Errors at 1 times the measured mm and 1 times the measured degrees, 30"),
         (
             "megapose-lmo-inliers",
             NoiseLevel(2.0, 0.5),
-            "Errors 2 times in mm and 0.5 times in deg what was measured, 30",
+            "Errors at 2 times the measured mm and 0.5 times the measured degrees, 30",
         ),
-        (Plain(lifted, 2.0, 0.5), NoiseLevel(2.0, 2.0), "Errors at every level alike, 30 operations"),
+        (Plain(lifted, 2.0, 0.5), NoiseLevel(2.0, 2.0), "Errors at every noise level, 30 operations"),
     ],
 )
 def test_a_card_says_what_its_level_means(given: object, noise_level: NoiseLevel, words: str) -> None:
-    assert f"\n{words}" in write_card(given, noise_level, draw_errors(given, noise_level, 10))
+    assert f"\n{words}" in noise_sheet(given, noise_level, draw_errors(given, noise_level, 10))
 
 
 def test_no_level_reaches_a_plain_function() -> None:
@@ -193,14 +193,14 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     text = presets()["megapose-lmo"].read_text(encoding="utf-8")
     blind.write_text(re.sub("missed_rate = [0-9.]+", "missed_rate = 1", text), encoding="utf-8")
     assert main(["noise", "show", str(blind)]) == 0
-    assert capsys.readouterr().out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
+    assert capsys.readouterr().out.endswith("\nNo operation of stick_in_tower was observed.\n")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["show", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        (["show", "isotropic", "--noise-level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
+        (["show", "isotropic", "--noise-level", "-1"], "noise_level must be a number from 0 to 50, got -1"),
         (["show", "megapose"], "did you mean 'megapose-lmo'"),
     ],
 )
