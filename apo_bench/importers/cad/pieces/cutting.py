@@ -63,7 +63,7 @@ def _cut(raw: RawSolid, others: Array | None, mates: Any, trims: bool) -> tuple[
     size = raw.mesh.extent
     body = body_of(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
-        raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
+        raise InputError("the mesh makes no solid; correct it where it was drawn, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
     for bore in bores:  # is filled with what was taken away, as the mesh has it
         body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
