@@ -27,11 +27,12 @@ class ArgumentError(InputError):
 def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     """`unknown corrector 'papr'; did you mean 'paper'? Known: none, oracle, paper.`"""
     names = sorted(allowed)
-    near = get_close_matches(given, names, n=1, cutoff=0.5)
+    longer = [name for name in names if given and name.startswith(given)]
+    near = longer or get_close_matches(given, names, n=1, cutoff=0.5)
     hint = f"; did you mean '{near[0]}'?" if near else "."
     shown = names if len(names) <= _MOST else get_close_matches(given, names, n=_MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
-    return f"unknown {kind} '{one_line(given, _LONGEST)}'{hint} Known: {', '.join(shown) or 'uncorrected'}{more}."
+    return f"unknown {kind} '{one_line(given, _LONGEST)}'{hint} Known: {', '.join(shown) or 'none'}{more}."
 
 
 def one_line(text: str, longest: int) -> str:

@@ -13,6 +13,8 @@ from typing import Any
 
 from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 
+SESSION = "session"
+"""The module part of the name of a function that cannot be imported: `session:mine`."""
 _FOLDERS: list[str] = []
 """Where modules that a person names may lie, too; the last one counts."""
 
@@ -106,3 +108,17 @@ def _public(module: Any) -> list[str]:
         if own and where.partition(".")[0] == package:
             names.append(name)
     return names
+
+
+def importable_name(function: Any) -> str | None:
+    """Return `module:name` of a function or class that another process can import; None of any other object."""
+    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
+    if module in (None, "__main__") or "<" in name or getattr(sys.modules.get(module), name, None) is not function:
+        return None
+    return f"{module}:{name}"
+
+
+def function_name(function: Any) -> str:
+    """Return the name of a function for records: `module:name`, or `session:name` if it cannot be imported."""
+    label = getattr(function, "__name__", type(function).__name__)
+    return importable_name(function) or f"{SESSION}:{label.strip('<>')}"

@@ -80,7 +80,7 @@ def keep(folder: Path) -> None:
     """Keep trials, table and what ran."""
     rows = read_records(folder)
     KEPT.mkdir(parents=True, exist_ok=True)
-    shutil.copy(report(folder).tables["cells"], KEPT / "table.csv")
+    shutil.copy(report(folder).tables["conditions"], KEPT / "table.csv")
     (KEPT / "run.json").write_text(json.dumps(describe_run(folder, rows), indent=2) + "\n", encoding="utf-8")
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
     packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)

@@ -6,9 +6,9 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import Cell, Paired, Rate, wilson
+from apo_bench.benchmark.analysis import ConditionResult, Paired, Rate, wilson
 from apo_bench.benchmark.report.comparison.compare import compare
-from apo_bench.benchmark.sweeps.grid import described, load_all
+from apo_bench.benchmark.sweeps.grid import describe_grids, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.records import SETTINGS, TrialConfig, is_uncorrected
 from benchmarks.headline_summary import NOISE, Summary, block, robot_scenarios
@@ -32,7 +32,7 @@ ROBOT = (
     "fails as well."
 )
 OLDER = " **`benchmarks/headline.toml` has changed since.**"
-Words = Callable[[Cell], tuple[str, ...]]
+Words = Callable[[ConditionResult], tuple[str, ...]]
 
 
 def page(summary: Summary, pairs: Sequence[Paired], ran: Mapping[str, Any], fidelity: Sequence[str]) -> list[str]:
@@ -93,7 +93,9 @@ def page(summary: Summary, pairs: Sequence[Paired], ran: Mapping[str, Any], fide
     ]
 
 
-def rates(cells: Sequence[Cell], heads: Sequence[str], row: Words, column: Callable[[Cell], Hashable]) -> list[str]:
+def rates(
+    cells: Sequence[ConditionResult], heads: Sequence[str], row: Words, column: Callable[[ConditionResult], Hashable]
+) -> list[str]:
     """Return a table of success in percent: a line per `row`, in the order of the cells, and a column per `column`."""
     columns = sorted({column(cell) for cell in cells}, key=lambda name: (isinstance(name, str), name))
     found: dict[tuple[str, ...], dict[Hashable, str]] = {}
@@ -104,7 +106,7 @@ def rates(cells: Sequence[Cell], heads: Sequence[str], row: Words, column: Calla
     return table((*heads, *names), lines)
 
 
-def _both(cell: Cell) -> str:
+def _both(cell: ConditionResult) -> str:
     success, demonstrated = (f"{100 * (rate or 0.0):.0f}" for rate in (cell.rate, cell.demonstrated_rate))
     return success if success == demonstrated else f"{success} ({demonstrated})"
 
@@ -117,10 +119,10 @@ def _widths(trials: int) -> str:
     )
 
 
-def _section(title: str, text: str, head: str, row: Words, cells: Sequence[Cell]) -> list[str]:
+def _section(title: str, text: str, head: str, row: Words, cells: Sequence[ConditionResult]) -> list[str]:
     """Return a table with a column per scenario, and one of all with its interval."""
     lines = rates(cells, (head, "method"), row, lambda cell: cell.scenario)
-    groups: dict[tuple[str, ...], list[Cell]] = {}
+    groups: dict[tuple[str, ...], list[ConditionResult]] = {}
     for cell in cells:
         groups.setdefault(row(cell), []).append(cell)
     pooled = [Rate(sum(c.successes for c in own), sum(c.trials for c in own)) for own in groups.values()]
@@ -129,14 +131,16 @@ def _section(title: str, text: str, head: str, row: Words, cells: Sequence[Cell]
 
 
 def _differences(pairs: Sequence[Paired]) -> list[str]:
-    compared = [p for p in pairs if p.place.method in COMPARED and not is_uncorrected(p.place.method) and p.pairs]
+    compared = [
+        p for p in pairs if p.condition.method in COMPARED and not is_uncorrected(p.condition.method) and p.pairs
+    ]
     apart = [p for p in compared if p.only_method or p.only_reference]
     lines = []
     for p in apart:
         low, high = (100 * x for x in p.interval)
-        human = f"{p.place.human_error_scale:g}"
+        human = f"{p.condition.human_error_scale:g}"
         difference = f"{100 * (p.difference or 0.0):+.1f} ({low:+.1f} to {high:+.1f})"
-        place = (p.place.scenario, human, f"{p.place.noise_mm:g}", p.place.noise, f"`{p.place.method}`")
+        place = (p.condition.scenario, human, f"{p.condition.noise_mm:g}", p.condition.noise, f"`{p.condition.method}`")
         lines.append((*place, p.pairs, p.only_method, p.only_reference, difference, f"{p.p_adjusted:.2g}"))
     heads = ("scenario", "human error", "noise, mm", "noise model", "method", "pairs", "it alone", "`paper` alone")
     return [
@@ -167,7 +171,7 @@ def is_up_to_date(ran: Mapping[str, Any]) -> bool:
     grids = read_sweep(GRID, {"trials": first["trials"], "fidelity": first["fidelity"]})
     # The committed sweep is older than these settings.
     usual = {name: [SETTINGS[name].default] for name in ("ft_sensor", "assumed_robot_error", "min_predicted_success")}
-    return described(grids, load_all(grids)) == [{**usual, **grid} for grid in ran["grids"]]
+    return describe_grids(grids, load_all(grids)) == [{**usual, **grid} for grid in ran["grids"]]
 
 
 def describe_fidelity(full: Path, near_contact: Path) -> list[str]:
@@ -192,20 +196,20 @@ def describe_fidelity(full: Path, near_contact: Path) -> list[str]:
     ]
 
 
-def _order(cell: Cell) -> tuple[Any, ...]:
+def _order(cell: ConditionResult) -> tuple[Any, ...]:
     method = (*METHODS, cell.method).index(cell.method)
     return cell.human_error_scale, cell.noise, cell.scenario, method, cell.noise_mm
 
 
-def _robot_order(cell: Cell) -> tuple[Any, ...]:
+def _robot_order(cell: ConditionResult) -> tuple[Any, ...]:
     return cell.robot_error != TrialConfig.robot_error, cell.robot_error, [*ROBOT_METHODS].index(cell.method)
 
 
-def _is_of_robot(cell: Cell, scenarios: Iterable[str]) -> bool:
+def _is_of_robot(cell: ConditionResult, scenarios: Iterable[str]) -> bool:
     """Return whether a condition has an error of the robot, or is the same without one."""
     same = cell.scenario in scenarios and cell.noise == TrialConfig.noise and cell.human_error_scale == 0.0
     return same and ROBOT_METHODS.get(cell.method) == cell.noise_mm
 
 
-def _name(cell: Cell) -> tuple[str, ...]:
+def _name(cell: ConditionResult) -> tuple[str, ...]:
     return cell.scenario, f"`{cell.method}`"

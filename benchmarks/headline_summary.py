@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from apo_bench.benchmark.analysis import Cell, Rate
+from apo_bench.benchmark.analysis import ConditionResult, Rate
 from apo_bench.records import TrialConfig
 
 NOISE = 1.0  # mm and degrees, of the sentence and of both limits
@@ -31,19 +31,19 @@ WORDS = {
 class Summary(NamedTuple):
     """The conditions of a headline."""
 
-    cells: Sequence[Cell]
+    cells: Sequence[ConditionResult]
     corrected: str
     """`contact-robust`, or `contact` of a sweep without it."""
 
 
-def summarise(cells: Sequence[Cell]) -> Summary:
+def summarise(cells: Sequence[ConditionResult]) -> Summary:
     """Choose the method that stands for corrected poses."""
     methods = {cell.method for cell in cells}
     return Summary(cells, "contact-robust" if "contact-robust" in methods else "contact")
 
 
 def pool(
-    cells: Iterable[Cell],
+    cells: Iterable[ConditionResult],
     method: str,
     noise_mm: float,
     noise: str = TrialConfig.noise,
@@ -69,7 +69,7 @@ def robot_rate(summary: Summary, method: str, error: str) -> Rate | None:
     return pool(summary.cells, method, noise_mm, robot_error=error, scenarios=robot_scenarios(summary.cells))
 
 
-def robot_scenarios(cells: Iterable[Cell]) -> list[str]:
+def robot_scenarios(cells: Iterable[ConditionResult]) -> list[str]:
     """Return the scenarios that ran with errors of the robot."""
     return sorted({cell.scenario for cell in cells if cell.robot_error != TrialConfig.robot_error})
 

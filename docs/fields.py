@@ -1,4 +1,4 @@
-"""Two pages of the reference, read from the types: the settings of a trial, and the columns of a row."""
+"""Two pages of the reference, read from the types: the settings and the record of a trial."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ fields of `TrialConfig` and `SweepConfig`, keys of a sweep file, arguments of th
 `apo-bench`. A sweep takes several values of some of them, and one of others. `noise_level` sets `noise_mm` and
 `noise_deg`.
 """
-ROW_HEAD = f"""# Columns of a trial record
+RECORD_HEAD = f"""# Columns of a trial record
 
 The record of a trial is one JSON object, one line of `trials.jsonl`, of schema `{RECORD_SCHEMA}`. Lengths are in mm,
-angles in degrees, quaternions are wxyz, operations are numbered from 1. The columns of the *key* distinguish the trials of
-one sweep; *needed* columns are in every record. A column that may be null may also be left out.
+angles in degrees, quaternions are wxyz, operations are numbered from 1. The columns of the *key* distinguish the
+trials of one sweep; *needed* columns are in every record. A column that may be null may also be left out.
 """
 FIRST = {
     "schema": "Version of these columns.",
@@ -77,10 +77,10 @@ def settings_page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def row_page() -> str:
+def record_page() -> str:
     """The page of columns, as Markdown."""
     said = sentences(TrialConfig) | sentences(TrialRecord) | FIRST
-    lines = [ROW_HEAD, "| column | meaning | value | null | |", "|---|---|---|---|---|"]
+    lines = [RECORD_HEAD, "| column | meaning | value | null | |", "|---|---|---|---|---|"]
     for column, kind in RECORD_FIELDS.items():
         value, null = without_null(type_info(kind))
         need = "key" if column in KEY else "needed" if column in REQUIRED else ""
@@ -142,4 +142,4 @@ def words(kind: Type) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(settings_page() + "\n" + row_page())
+    sys.stdout.write(settings_page() + "\n" + record_page())

@@ -16,7 +16,7 @@ from fields import sentences
 
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED
 from apo_bench.benchmark.sweeps.sweep_file import SweepTable
-from apo_bench.cli.setting_options import shown_default
+from apo_bench.cli.shared.setting_options import shown_default
 from apo_bench.importers.assembly.writing import THRESHOLDS
 from apo_bench.perception.observation import noise_file
 from apo_bench.records import SETTINGS, SettingInfo
@@ -44,14 +44,21 @@ SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
 
 
 def sweep_meanings() -> dict[str, str]:
-    """Key of a sweep file -> what it means, of the settings of a trial."""
-    axes = {info.axis: (info, "a list") for info in AXES if info.axis != "scenarios"}
-    shared = {SETTINGS[name].keyword: (SETTINGS[name], "one for the whole sweep") for name in SHARED}
-    return {key: f"{info.help}: {how}; else {default_of(info)}" for key, (info, how) in {**axes, **shared}.items()}
+    """Return what each setting of a trial means as a key of a sweep file."""
+    several = [*AXES, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]
+    meanings = {
+        info.name: f"{info.help}: one value or several; default {default_of(info)}"
+        for info in several
+        if info.name != "scenario"
+    }
+    for name in SHARED:
+        info = SETTINGS[name]
+        meanings[info.keyword] = f"{info.help}: one value for the whole sweep; default {default_of(info)}"
+    return meanings
 
 
 def default_of(info: SettingInfo) -> str:
-    """What a sweep has where nothing is said."""
+    """Return the default of a sweep in words."""
     return ", ".join(f"`{value:g}`" if isinstance(value, float) else f"`{value}`" for value in info.swept) or (
         info.usual or f"`{shown_default(info)}`"
     )
@@ -191,7 +198,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     },
     "Sweep files": {
         "": {
-            "scenarios": "names, or scenario files",
+            "scenario": "name or scenario file: one or several",
             **sweep_meanings(),
             "trials": "seeds per cell, 1 to 1000000; else 100",
             "seed": "the first seed; else 0",

@@ -1,9 +1,8 @@
-"""What `mkdocs build` does beside HTML: it writes four pages of the reference, sets formulas, and refuses to load from
-a network.
+"""Hooks of `mkdocs build`: pages of the reference from the code, formulas as MathML, and nothing from a network.
 
-The command line, the keys of files, the settings of a trial and the columns of a row are read from the package while
-the site is built, so these pages are never older than the code. A page that would load anything from a network is an
-error: the site opens offline. Formulas, `$..$` and `$$..$$` as on GitHub, become MathML, which browsers set themselves.
+The command line, the keys of files, the settings and the record of a trial are read from the package while the site is
+built, so these pages are never older than the code. A page that would load anything from a network is an error: the
+site opens offline. Formulas, `$..$` and `$$..$$` as on GitHub, become MathML, which browsers render themselves.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ GENERATED = {
     "reference/command-line.md": command_line.page,
     "reference/files.md": file_keys.page,
     "reference/settings.md": fields.settings_page,
-    "reference/trial-record.md": fields.row_page,
+    "reference/trial-record.md": fields.record_page,
 }
 LOADED = re.compile(
     r"<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)=[\"']?(?:https?:)?//[^>]*>", re.IGNORECASE
@@ -36,16 +35,6 @@ LOADED = re.compile(
 
 SHORT = re.compile(r"<code>([^<\s]{1,20})</code>")
 FORMULA = re.compile(r"<(?P<tag>span|div) class=\"arithmatex\">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>", re.DOTALL)
-
-
-def on_config(config: Any) -> Any:
-    """The settings, without a page that a benchmark has yet to write."""
-    there = Path(config.docs_dir)
-    for section in config.nav:
-        for title, pages in section.items():
-            if isinstance(pages, list):
-                section[title] = [page for page in pages if page in GENERATED or (there / page).exists()]
-    return config
 
 
 def on_files(files: Files, config: Any) -> Files:

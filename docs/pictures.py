@@ -1,5 +1,4 @@
-"""Draw the picture at the top, what is believed, and two pictures of films: `python docs/pictures.py` (half a minute,
-no display needed)."""
+"""Draw the picture at the top, pose estimates and two pictures of films: `python docs/pictures.py` (half a minute)."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.rollout import Rollout
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
-from apo_bench.viz.believed_picture import belief_panel, draw_beliefs
+from apo_bench.viz.poses_picture import draw_poses, poses_panel
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 7
@@ -39,8 +38,8 @@ def main() -> None:
         )
     ]
     draw_top(shots, HERE / "top.png")
-    beliefs = [belief_panel("as seen", seen, seen.poses, 3), belief_panel("corrected by contact", seen, corrected, 3)]
-    draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
+    panels = [poses_panel("observed", seen, seen.poses, 3), poses_panel("corrected by contact", seen, corrected, 3)]
+    draw_poses(scene.scenario, 3, panels, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")
 

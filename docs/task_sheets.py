@@ -6,15 +6,16 @@ The table of how far nominal poses go, in docs/how/judge.md, is written too.
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import relation_graph
+from apo_bench.scenario import Scenario
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.viz.card import cards
-from apo_bench.viz.graph.drawing import draw_graph
-from apo_bench.viz.graph.text import graph_title
+from apo_bench.viz.graph_picture import draw_graph
+from apo_bench.viz.task_sheet import task_sheet
 from benchmarks.baselines import HEAD, describe, describe_nominal, read_counts
 
 HERE = Path(__file__).parent
@@ -25,18 +26,42 @@ FIRST = "<!-- nominal -->"
 LAST = "<!-- end of nominal -->"
 
 
+def page(scenarios: Sequence[Scenario], measured: Mapping[str, str]) -> str:
+    """The page of all task sheets.
+
+    Args:
+        measured: Scenario -> what was measured of it, in Markdown.
+    """
+    lines = [
+        *(
+            "<!-- Written by `python docs/task_sheets.py`; change the scenarios, not this page. -->",
+            "",
+            "# Scenarios",
+            "",
+        ),
+        *(f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios),
+        *("", "*Success* has [two verdicts](../how/judge.md).", "", HEAD),
+    ]
+    for s in scenarios:
+        head, _, rest = task_sheet(s, 2).partition("\n\n")
+        graph = f"![Relations of {s.name} after its last operation]({PICTURE.format(s.name)})"
+        lines += ["", f'<a id="{s.name}"></a>', "", head, "", graph, "", rest.rstrip("\n")]
+        lines += ["", "### Difficulty", "", measured[s.name]]
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
     scenarios = [load_scenario(name) for name in scenario_names()]
     counts = read_counts()
     measured = {scenario.name: describe(scenario, counts) for scenario in scenarios}
-    PAGE.write_text(cards(scenarios, "python docs/task_sheets.py", PICTURE, HEAD, measured), encoding="utf-8")
+    PAGE.write_text(page(scenarios, measured), encoding="utf-8")
     before, _, rest = JUDGE.read_text(encoding="utf-8").partition(FIRST)
     table = f"{FIRST}\n{describe_nominal(scenarios, counts)}\n{LAST}"
     JUDGE.write_text(before + table + rest.partition(LAST)[2], encoding="utf-8")
     for scenario in scenarios:
         graph = relation_graph(scenario.assembly)
         path = PAGE.parent / PICTURE.format(scenario.name)
-        draw_graph(graph, path, title=graph_title(scenario.name, graph), colors=scenario.colors)
+        draw_graph(graph, path, f"{scenario.name} after operation {graph.step}", colors=scenario.colors)
 
 
 if __name__ == "__main__":

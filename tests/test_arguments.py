@@ -20,7 +20,7 @@ from apo_bench.resources import folder
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"
-NAMES = sorted(name for name in apo_bench.__all__ if name not in ("__version__", "InputError"))
+NAMES = sorted(name for name in apo_bench.__all__ if name not in ("__version__", "InputError", "RateTable", "evaluate"))
 ENVIRONMENTS = sorted(name for name in gymnasium.registry if name.startswith("APO"))
 WRONG: tuple[Any, ...] = (None, 2, 1.5, "x", [1.5], [object()], object())
 
@@ -151,7 +151,7 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
     n = len(observation.poses)
     assert dataclasses.replace(observation, observed=[1] * n).observed.all()
     for seen in ([2] * n, [np.nan] * n, ["yes"] * n):
-        with pytest.raises(apo_bench.InputError, match="seen of Observation must be an array of True"):
+        with pytest.raises(apo_bench.InputError, match="observed of Observation must be an array of True"):
             dataclasses.replace(observation, observed=seen)
     start = {**observation.start, "stik": np.eye(4)}
     shown = {"human_error_scale": observation.covariance, "final": {}}
@@ -166,7 +166,7 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
 
 def test_an_array_of_a_wrong_shape_is_named() -> None:
     observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    with pytest.raises(apo_bench.InputError, match=r"^goals of Observation: an array of shape \(\d, 4, 4\) is needed"):
+    with pytest.raises(apo_bench.InputError, match=r"^poses of Observation: an array of shape \(\d, 4, 4\) is needed"):
         dataclasses.replace(observation, poses=observation.poses[:1])
 
 

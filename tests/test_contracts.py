@@ -43,8 +43,8 @@ BREACHES = {
         ("apo_bench.benchmark.report.report", "apo_bench.benchmark.scoring.score"),
     ],
     "importers": [
-        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.draft"),
-        ("apo_bench.importers.assembly.draft", "apo_bench.importers.recording.importing"),
+        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.new_scenario"),
+        ("apo_bench.importers.assembly.new_scenario", "apo_bench.importers.recording.importing"),
     ],
     "simulation": [
         ("apo_bench.simulation.arms.kinematics", "apo_bench.simulation.scene.world"),
@@ -87,13 +87,13 @@ BREACHES = {
     ],
     "importers-used": [
         ("apo_bench.trial.run", "apo_bench.importers.recording.importing"),
-        ("apo_bench.viz.card", "apo_bench.importers.assembly.draft"),
+        ("apo_bench.viz.task_sheet", "apo_bench.importers.assembly.new_scenario"),
         ("apo_bench.scenario.file", "apo_bench.importers.cad.importing"),
     ],
     "report": [
         ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.comparison.text"),
         ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.answer"),
-        ("apo_bench.benchmark.report.tables.cells", "apo_bench.benchmark.report.facts"),
+        ("apo_bench.benchmark.report.tables.conditions", "apo_bench.benchmark.report.facts"),
         ("apo_bench.benchmark.report.figures.figures", "apo_bench.benchmark.report.page.report_page"),
     ],
     "statistics": [

@@ -6,14 +6,18 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from apo_bench.benchmark.rate_table import RateTable
-from apo_bench.benchmark.session import SESSION, name_functions
-from apo_bench.benchmark.sweeps.grid import SweepConfig
+from apo_bench.benchmark.session import name_functions
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep
-from apo_bench.errors import require
-from apo_bench.records import TrialRecord
+from apo_bench.errors import require, require_known
+from apo_bench.names import SESSION
+from apo_bench.records import TrialConfig, TrialRecord
+from apo_bench.scenario import Scenario, is_named, scenario_path
 
 Method = str | Callable[..., Any]
 """A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)` poses."""
+
+_AXES = tuple(info.name for info in AXES if info.name != "method")
 
 
 def evaluate(
@@ -35,8 +39,8 @@ def evaluate(
         workers: Processes; 1 runs the trials in this process, as functions of a notebook and lambdas need.
         save: Folder of the records, as `apo-bench sweep` writes it; the same call continues an interrupted run.
             Default: a temporary folder.
-        settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ...;
-            `seed` is the first seed. `noise` may be a function too.
+        settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ...; the
+            defaults are those of one trial, and `seed` is the first seed. A scenario may be a `Scenario`, and `noise` a function.
 
     Returns:
         A table with the success rate of each condition.
@@ -45,9 +49,15 @@ def evaluate(
         InputError: An unknown setting, a value that is not allowed, or a function with more than one worker that cannot
             be imported.
     """
+    for name in settings:
+        require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))
+    settings = {"noise_level": 1.0, "human_error_scale": TrialConfig.human_error_scale} | settings
     labelled = dict(_label(method, "method"))
     noises = dict(_label(settings.pop("noise", ()), "noise"))
     functions = {label: each for label, each in (labelled | noises).items() if callable(each)}
+    scenarios = settings.get("scenario", ())
+    several = (scenarios,) if isinstance(scenarios, str | Path | Scenario) else tuple(scenarios)
+    settings["scenario"] = tuple(map(_scenario_source, several))
     with name_functions(functions) as names:
         local = [label for label, name in names.items() if name.startswith(f"{SESSION}:")]
         require(
@@ -69,6 +79,18 @@ def evaluate(
         records = run_sweep(grid, folder, workers=None if workers == 1 else workers)
     labels = {name: label for label, name in names.items()}
     return RateTable(tuple(_relabel(record, labels) for record in records), folder, temporary)
+
+
+def _scenario_source(scenario: str | Path | Scenario) -> str:
+    """The name or the file of a scenario, which a worker loads."""
+    if not isinstance(scenario, Scenario):
+        return str(scenario)
+    require(
+        scenario.source is not None,
+        f"the scenario '{scenario.name}' was given, which was not read from a file; give its file.",
+    )
+    shipped = is_named(scenario.name) and scenario_path(scenario.name) == scenario.source
+    return scenario.name if shipped else str(scenario.source)
 
 
 def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:

@@ -95,9 +95,9 @@ class RateTable:
 
     def _table(self) -> Any:
         from apo_bench.benchmark.analysis import tally
-        from apo_bench.benchmark.report.tables.cells import cell_table
+        from apo_bench.benchmark.report.tables.conditions import condition_table
 
-        return cell_table(tally(self.records))
+        return condition_table(tally(self.records))
 
 
 def _align(lines: Sequence[Sequence[str]]) -> Iterable[str]:

@@ -8,9 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from apo_bench.errors import require
-
-SESSION = "session"
-"""The module part of the name of a function that cannot be imported: `session:mine`."""
+from apo_bench.names import SESSION, importable_name
 
 
 @contextmanager
@@ -35,11 +33,3 @@ def name_functions(functions: Mapping[str, Callable[..., Any]]) -> Iterator[Mapp
         yield names
     finally:
         del sys.modules[SESSION]
-
-
-def importable_name(function: Any) -> str | None:
-    """`module:name` of a function or class that another process can import; None of any other object."""
-    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
-    if module in (None, "__main__") or "<" in name or getattr(sys.modules.get(module), name, None) is not function:
-        return None
-    return f"{module}:{name}"

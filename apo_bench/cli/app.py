@@ -1,48 +1,63 @@
-"""The command line: `apo-bench scenario list | graph | explain | correct | scene | replay | sweep | report | ..`.
+"""The program `apo-bench`: its commands, and its exit codes.
 
-Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
-request was wrong, with one sentence on stderr; 128 and the number of the signal that ended it. Lengths in mm, angles in
-degrees.
+Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the request
+was wrong, with one sentence on stderr; 128 and the number of a signal that ended it.
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated
 
 import typer
 
 from apo_bench import __version__
-from apo_bench.cli import noise, part, recording, scenario, score, sweep
-from apo_bench.cli.arguments import NO_RESULT
+from apo_bench.cli import arm, assembly, dataset, inspection, method, noise, part, recording, scenario, track
+from apo_bench.cli.compare import compare_command
 from apo_bench.cli.correct_command import correct_command
-from apo_bench.cli.detect_contacts import detect_contacts_command
-from apo_bench.cli.help import Grouped, GroupedOptions, group
-from apo_bench.cli.inspect_depth import depth_command
-from apo_bench.cli.inspect_dof import dof_command
-from apo_bench.cli.inspect_graph import graph_command
-from apo_bench.cli.inspect_plan import plan_command
-from apo_bench.cli.inspect_poses import poses_command
-from apo_bench.cli.inspect_scene import scene_command
-from apo_bench.cli.run_command import run_command
+from apo_bench.cli.detect_command import detect_contacts_command
+from apo_bench.cli.doctor import doctor_command
+from apo_bench.cli.leaderboard import leaderboard_command
+from apo_bench.cli.report import report_command
+from apo_bench.cli.run import run_command
+from apo_bench.cli.score import score_command
+from apo_bench.cli.shared import NO_RESULT, Command, Group, Interrupted
+from apo_bench.cli.sweep import sweep_command
 from apo_bench.cli.view import view_command
 from apo_bench.errors import InputError
 from apo_bench.io import brief, clean, streams
 from apo_bench.names import own_modules_in
 
-app = typer.Typer(
-    cls=Grouped,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    help="Does a robot's replay of an observed assembly fit, with and without correction by face contacts?",
-)
-
 WRONG_REQUEST = 2
 _INTERRUPTED = 130
+_COMMANDS: Mapping[str, Callable[..., None]] = {
+    "run": run_command,
+    "view": view_command,
+    "correct": correct_command,
+    "detect-contacts": detect_contacts_command,
+    "sweep": sweep_command,
+    "report": report_command,
+    "compare": compare_command,
+    "score": score_command,
+    "leaderboard": leaderboard_command,
+    "doctor": doctor_command,
+}
+_HELP = """
+Test whether a robot's replay of an observed assembly fits, with and without correction by face contacts.
+
+Examples:
+  apo-bench run stick_in_tower --noise-level 1 --seed 7
+  apo-bench scenario list
+"""
+app = typer.Typer(cls=Group, pretty_exceptions_enable=False, rich_markup_mode=None, help=_HELP)
+for _name, _command in _COMMANDS.items():
+    app.command(_name, cls=Command)(_command)
+for _group in (arm, assembly, dataset, inspection, method, noise, part, recording, scenario, track):
+    app.add_typer(_group.commands)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code. What `module:name` names may lie in the current folder."""
+    """Run the command line and return its exit code; `module:name` may name a module in the current folder."""
     try:
         here = streams.prepare()
         words = list(sys.argv[1:] if arguments is None else arguments)
@@ -51,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         streams.finish()
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
-    except (sweep.Interrupted, KeyboardInterrupt) as error:
+    except (Interrupted, KeyboardInterrupt) as error:
         return _complain(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
     except (RuntimeError, streams.Unusable) as error:
         return _complain(str(error), NO_RESULT)
@@ -60,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _complain(streams.unexpected(error), NO_RESULT)
     except SystemExit as error:
-        # what the command line library makes of a pipe that nobody reads
+        # the command line library leaves like this when the reader of a pipe is gone
         if not isinstance(error.__context__, OSError):
             raise
         streams.give_up_output()
@@ -69,8 +84,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not hasattr(error, "format_message"):
             raise
         return _complain(" ".join(error.format_message().split()), WRONG_REQUEST)
-    if code == _INTERRUPTED:  # what the command line library makes of Ctrl-C
-        return _complain("interrupted.", _INTERRUPTED)
     return int(code or 0)
 
 
@@ -80,49 +93,20 @@ def _complain(sentence: str, code: int) -> int:
     return code
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"apo-bench {__version__}")
         raise typer.Exit
 
 
 @app.callback()
-def _options(
+def _accept_options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Options of every command."""
+    """Options of the program itself."""
 
-
-_LONG = ("run", "sweep")
-"""Commands whose options are listed in groups."""
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "run": run_command,
-    "view": view_command,
-    "correct": correct_command,
-    "detect-contacts": detect_contacts_command,
-    "sweep": sweep.sweep_command,
-    "report": score.report_command,
-    "compare": score.compare_command,
-    "score": score.score_command,
-    "leaderboard": score.leaderboard_command,
-}
-_INSPECT: dict[str, Callable[..., None]] = {
-    "dof": dof_command,
-    "plan": plan_command,
-    "graph": graph_command,
-    "scene": scene_command,
-    "poses": poses_command,
-    "depth": depth_command,
-}
-inspect = group("inspect", "Look into one plan: free directions, motions, relation graph, scene, poses, depth images.")
-for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _name, _command in _INSPECT.items():
-    inspect.command(_name)(_command)
-for _group in (inspect, sweep.dataset, noise.noise, part.arm, part.part, scenario.scenario, recording.recording):
-    app.add_typer(_group)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,73 +1,88 @@
-"""The command `apo-bench inspect dof`: what the contacts determine. Only its picture needs a simulator."""
+"""The command `apo-bench inspect dof`: what contacts fix; only its picture needs a simulator."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import AsJson, DeviationDeg, DeviationMm, ScenarioArgument
-from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.planned import plan_correction
-from apo_bench.cli.printing import print_json, print_tables, say
-from apo_bench.formats.observation import as_planned, read_observation_file
-from apo_bench.scenario.file import load_scenario
+from apo_bench.cli.shared import (
+    AsJson,
+    DeviationDeg,
+    DeviationMm,
+    ScenarioArgument,
+    check_output,
+    path_option,
+    print_json,
+    print_table,
+    print_written,
+)
 
 
 def dof_command(
     scenario: ScenarioArgument,
     observation: Annotated[
-        Path | None, typer.Option(help="At the corrected goals of this .json or .csv; default: the nominal ones.")
+        Path | None, path_option("Use the corrected poses of this observation; default: the nominal poses.")
     ] = None,
-    deviation_mm: DeviationMm = 1.0,
-    deviation_deg: DeviationDeg = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Draw the free directions into this file: .png.")] = None,
+    deviation_mm: DeviationMm = None,
+    deviation_deg: DeviationDeg = None,
+    out: Annotated[Path | None, path_option("Draw the free directions into this file: .png.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
-    from apo_bench.correction.correctors import correct
-    from apo_bench.correction.explanation import explain
-    from apo_bench.trial.predicted_success import predicted_success_sentence
-    from apo_bench.viz.explain_text import (
-        explanation_form,
+    """Explain the degrees of freedom: what each relation fixes, what is free, and how well poses are known.
+
+    Examples:
+      apo-bench inspect dof stick_in_tower --out free.png
+      apo-bench inspect dof stick_in_tower --observation docs/seen.csv
+    """
+    from apo_bench import correct, explain, load_scenario
+    from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, assumed_deviations
+    from apo_bench.formats.observation import as_planned, read_observation_file
+    from apo_bench.viz.dof_text import (
+        PART_COLUMNS,
+        count_directions,
+        dof_form,
+        dof_lines,
         hypothesis_forms,
         hypothesis_lines,
-        part_table,
-        sentences,
-        total,
     )
+    from apo_bench.viz.tables import form_table
 
-    check_outputs([(out, "--out", (".png",))])
-    stated = f"seen with a standard deviation of {deviation_mm:g} mm and {deviation_deg:g} deg per axis"
+    check_output(out, "--out", ".png")
     predicted_success = None
     if observation is None:
-        loaded = load_scenario(scenario)
-        seen = as_planned(loaded, deviation_mm, deviation_deg)
-        at: Any = seen.poses
-        where = f"at the nominal goals, {stated}"
+        task, assumed = load_scenario(scenario), True
+        mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+        deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
+        observed = as_planned(task, mm, deg)
+        explanation = explain(observed, observed.poses)
     else:
-        seen, loaded, assumed = read_observation_file(
+        observed, task, assumed = read_observation_file(
             observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
         )
-        at = correct(seen)
-        if not at.ok:
-            raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {at.sentence}.")
-        predicted_success = plan_correction(loaded, seen, at).predicted_success
-        where = f"at the corrected goals of {observation}" + f", {stated} where it states none" * assumed
-    explanation = explain(seen, at)
+        correction = correct(observed)
+        if not correction.ok:
+            raise RuntimeError(f"{observation} has no correction to explain: {correction.sentence}.")
+        predicted_success = plan_correction(task, observed, correction)[2]
+        explanation = explain(observed, correction)
     if out is not None:
-        from apo_bench.viz.explain_picture import draw_explanation
+        from apo_bench.viz.dof_picture import draw_dof
 
-        draw_explanation(loaded, seen, explanation, out)
-    form = explanation_form(loaded.name, explanation)
+        draw_dof(task, observed, explanation, out)
+    form = dof_form(task.name, explanation)
     if as_json:
-        known = {"predicted_success": predicted_success, "hypotheses": hypothesis_forms(explanation.hypotheses)}
-        print_json(form | known)
-    else:
-        lines = [f"{loaded.name}: {total(explanation)}", where]
-        if predicted_success is not None:
-            lines.append(f"promised: {predicted_success_sentence(predicted_success)}")
-        lines += [f"may be {line}" for line in hypothesis_lines(explanation.hypotheses)]
-        typer.echo("\n".join([*lines, "", *sentences(explanation)]))
-        print_tables(part_table(form))
-    if out is not None:
-        say(f"\nWrote {out}", as_json)
+        more = {"predicted_success": predicted_success, "hypotheses": hypothesis_forms(explanation.hypotheses)}
+        print_json(form | more)
+        return
+    lines = [
+        f"{task.name}: {count_directions(explanation)}",
+        f"at the {'nominal poses' if observation is None else f'corrected poses of {observation}'}",
+        *([assumed_deviations(deviation_mm, deviation_deg)] if assumed else []),
+        *([] if predicted_success is None else [f"predicted success {predicted_success:.2f}"]),
+        *(f"hypothesis {line}" for line in hypothesis_lines(explanation.hypotheses)),
+        "",
+        *dof_lines(explanation),
+    ]
+    typer.echo("\n".join(lines))
+    print_table(form_table(form["parts"], PART_COLUMNS))
+    print_written(out)

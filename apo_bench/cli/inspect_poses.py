@@ -1,4 +1,4 @@
-"""The command `apo-bench inspect poses`: a picture of what is believed."""
+"""The command `apo-bench inspect poses`: a picture of observed and corrected poses."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,75 +6,71 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.assembly import Observation
-from apo_bench.cli.arguments import ScenarioArgument, StatedDeg, StatedMm
-from apo_bench.cli.outputs import check_writable
-from apo_bench.cli.setting_options import takes, trial_options
+from apo_bench.cli.shared import (
+    DeviationDeg,
+    DeviationMm,
+    ScenarioArgument,
+    check_output,
+    path_option,
+    print_written,
+    takes,
+    trial_options,
+)
 from apo_bench.errors import require
-from apo_bench.formats.deviations import assumed_deviations
-from apo_bench.geometry import Array
 from apo_bench.records import CORRECTOR, with_simulated
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
 
 
 @takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
 def poses_command(
     scenario: ScenarioArgument,
     *,
-    out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
-    seen: Annotated[bool, typer.Option("--seen", help="Only what was seen.")] = False,
-    corrected: Annotated[bool, typer.Option("--corrected", help="Only what the method makes of it.")] = False,
+    out: Annotated[Path, path_option("Draw the poses into this file: .png.")] = Path("poses.png"),
+    observed: Annotated[bool, typer.Option("--observed", help="Draw the observed poses alone.")] = False,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
-    method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = CORRECTOR,
-    observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
-    deviation_mm: StatedMm = None,
-    deviation_deg: StatedDeg = None,
+    method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
+    observation: Annotated[Path | None, path_option("Use this observation in place of a trial.")] = None,
+    deviation_mm: DeviationMm = None,
+    deviation_deg: DeviationDeg = None,
     **options: Any,
 ) -> None:
-    """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
-    from apo_bench.trial.request import load_or_draw_observation
-    from apo_bench.viz.believed_picture import belief_lines, belief_panel, draw_beliefs
+    """Draw the parts where they were observed, and where corrected poses put them.
 
-    check_writable(out, "--out", (".png",))
-    loaded = load_scenario(scenario)
-    last = len(loaded.assembly)
-    k = last if step is None else step
-    require(1 <= k <= last, f"step {step} was given; the scenario has operations 1 to {last}.")
-    observed, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
-    _check_seen(observed, k)
-    panels = []
-    if seen or not corrected:
-        panels.append(belief_panel("as seen", observed, observed.poses, k))
-    if corrected or not seen:
-        goals, notes = _correct(loaded, observed, method)
-        panels.append(belief_panel(f"corrected by {method}", observed, goals, k, notes))
-    draw_beliefs(loaded, k, panels, out)
-    lines = belief_lines(panels)
-    if assumed and (corrected or not seen):
-        lines.append(assumed_deviations(deviation_mm, deviation_deg))
-    typer.echo("\n".join([*lines, f"Wrote {out}"]))
-
-
-def _correct(scenario: Scenario, observed: Observation, method: str) -> tuple[Array, str]:
-    """The goals that are planned, (n, 4, 4), and what speaks against them."""
-    from apo_bench.correction.correctors import correct
-    from apo_bench.trial.fitting import fitting_plan
+    Examples:
+      apo-bench inspect poses stick_in_tower --noise-level 2 --seed 7 --out poses.png
+      apo-bench inspect poses stick_in_tower --observation docs/seen.csv --step 2 --observed
+    """
+    from apo_bench import correct, fitting_plan, load_scenario
+    from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.trial.plan_warnings import plan_warning
+    from apo_bench.trial.request import load_or_draw_observation
+    from apo_bench.viz.poses_picture import draw_poses, poses_lines, poses_panel
 
-    correction = correct(observed, with_simulated(method))
-    if not correction.ok:
-        raise RuntimeError(
-            f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
-        )
-    planned = fitting_plan(correction, observed, scenario)
-    notes = filter(None, (planned.sentence, plan_warning(scenario, planned.plan, correction)))
-    return planned.plan.target_poses, "; ".join(notes)
+    check_output(out, "--out", ".png")
+    task = load_scenario(scenario)
+    last = len(task.assembly)
+    step = last if step is None else step
+    require(1 <= step <= last, f"--step must be from 1 to {last}, got {step}.")
+    seen, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
+    _check_observed(seen, step)
+    panels = [poses_panel("observed", seen, seen.poses, step)]
+    if not observed:
+        correction = correct(seen, with_simulated(method))
+        if not correction.ok:
+            raise RuntimeError(f"{method} found no correction: {correction.sentence}; --observed needs none")
+        plan = fitting_plan(correction, seen, task)
+        notes = "; ".join(filter(None, (plan.sentence, plan_warning(task, plan.plan, correction))))
+        panels.append(poses_panel(f"corrected by {method}", seen, plan.plan.target_poses, step, notes))
+    draw_poses(task, step, panels, out)
+    typer.echo("\n".join(poses_lines(panels)))
+    if assumed and not observed:
+        typer.echo(assumed_deviations(deviation_mm, deviation_deg))
+    print_written(out)
 
 
-def _check_seen(observed: Observation, step: int) -> None:
-    """Nothing is known after an operation that was not seen."""
-    missed = int(observed.observed.argmin()) + 1
-    if observed.observed.all() or missed > step:
+def _check_observed(seen: Observation, step: int) -> None:
+    """Raise where an operation up to this one was not observed: the poses after it are unknown."""
+    missed = int(seen.observed.argmin()) + 1
+    if seen.observed.all() or missed > step:
         return
-    before = f"--seen --step {missed - 1} shows what is known before it" if missed > 1 else "nothing is known before it"
-    raise RuntimeError(f"operation {missed} was not seen, so nothing is known after it; {before}.")
+    advice = f"; --observed --step {missed - 1} draws the state before it" * (missed > 1)
+    raise RuntimeError(f"operation {missed} was not observed, so the poses after it are unknown{advice}.")

@@ -5,25 +5,29 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import ScenarioArgument
-from apo_bench.cli.outputs import check_outputs
-from apo_bench.cli.setting_options import takes, trial_options
-from apo_bench.io import write_file
+from apo_bench.cli.shared import ScenarioArgument, check_output, path_option, takes, trial_options
 from apo_bench.records import check, in_python
-from apo_bench.scenario.file import load_scenario
 
 
 @takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
 def scene_command(
-    scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **options: Any
+    scenario: ScenarioArgument,
+    out: Annotated[Path, path_option("Write the MJCF file: .xml.")],
+    **options: Any,
 ) -> None:
-    """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
+    """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer.
+
+    Examples:
+      apo-bench inspect scene stick_in_tower --out tower.xml
+      apo-bench inspect scene peg_in_hole --arm panda_primitive --clearance-mm 0.4 --out peg.xml
+    """
+    from apo_bench import load_scenario
+    from apo_bench.io import write_file
     from apo_bench.simulation.scene.scene import scene_xml
 
+    check_output(out, "--out", ".xml")
     settings = in_python({name: value for name, value in options.items() if value is not None})
     for name, value in settings.items():
         check(name, value)
-    loaded = load_scenario(scenario)
-    check_outputs([(out, "--out", (".xml",))])
-    write_file(out, scene_xml(loaded, **settings))
+    write_file(out, scene_xml(load_scenario(scenario), **settings))
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")

@@ -1,142 +1,150 @@
-"""The command `apo-bench recording import`: the log of a tracker becomes an observation file."""
+"""The command `apo-bench recording import`: the log of a tracker becomes an observation."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.help import group
-from apo_bench.cli.outputs import check_outputs
-from apo_bench.cli.printing import print_lines
-from apo_bench.cli.values import numbers, path_given, whole_numbers
+from apo_bench.cli.shared import (
+    Command,
+    check_output,
+    group,
+    parse_list,
+    path_argument,
+    path_option,
+    print_columns,
+    print_written,
+)
 from apo_bench.errors import InputError, require
 from apo_bench.io import write_csv
-from apo_bench.scenario.file import load_scenario
 
-recording = group("recording", "Logs of pose trackers.")
+_HELP = """
+Logs of pose trackers.
+
+Examples:
+  apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
+  apo-bench correct stick_in_tower --observation seen.csv
+"""
+commands = group("recording", _HELP)
 
 
-@recording.command("import")
+@commands.command("import", cls=Command)
 def recording_import(
-    log: Annotated[Path, typer.Argument(help="The log, or a folder of one file an object.", parser=path_given)],
+    log: Annotated[Path, path_argument("LOG", "The log, or a folder with a file for each object.")],
     form: Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")],
-    camera: Annotated[Path, typer.Option(help="How the log is written, and where its camera stands: .toml.")],
-    objects: Annotated[Path, typer.Option(help="Which id is which part, and where its frame lies: .toml.")],
-    out: Annotated[Path, typer.Option(help="The observation file: .json, or .csv without starts and covariances.")],
-    scenario: Annotated[str | None, typer.Option(help="Of which scenario it is; .json needs one.")] = None,
+    camera: Annotated[Path, path_option("Conventions of the log, and pose of its camera: .toml.")],
+    objects: Annotated[Path, path_option("Part and frame of each id: .toml.")],
+    out: Annotated[Path, path_option("Write the observation: .json, or .csv without starts and covariances.")],
+    scenario: Annotated[str | None, typer.Option(help="Scenario of the recording; .json needs one.")] = None,
     ends: Annotated[
-        str | None, typer.Option(help="When each operation had ended, s with commas, where the log leaves it unclear.")
+        str | None, typer.Option(help="End of each operation in s, with commas, where the log is ambiguous.")
     ] = None,
     unseen: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw frames, paths and rests into this file: .png.")] = None,
-    paths: Annotated[Path | None, typer.Option(help="Write the paths between rests: .csv.")] = None,
+    picture: Annotated[Path | None, path_option("Draw frames, paths and rests: .png.")] = None,
+    paths: Annotated[Path | None, path_option("Write the paths between rests: .csv.")] = None,
 ) -> None:
-    """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
+    """Turn the log of a pose tracker into an observation: frames, rests, the order of operations.
+
+    Examples:
+      apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
+      apo-bench recording import log.csv --format csv --camera c.toml --objects o.toml --scenario dovetail --out s.json
+    """
     from apo_bench.importers.recording.camera_file import read_camera
     from apo_bench.importers.recording.formats import read_log
-    from apo_bench.importers.recording.hands import find_hands
     from apo_bench.importers.recording.objects_file import name_tracks, read_objects
-    from apo_bench.importers.recording.show.text import reading_lines
+    from apo_bench.importers.recording.text import reading_lines
 
-    outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
-    check_outputs(outputs, (log, camera, objects))
-    require(
-        scenario is not None or (out.suffix.lower() != ".json" and not ends and not unseen and not paths),
-        "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone.",
-    )
+    inputs = (log, camera, objects)
+    check_output(out, "--out", ".json", ".csv", inputs=inputs)
+    check_output(picture, "--picture", ".png", inputs=inputs)
+    check_output(paths, "--paths", ".csv", inputs=inputs)
+    planned = out.suffix.lower() == ".json" or ends or unseen or paths
+    require(scenario is not None or not planned, "--out .json, --ends, --unseen and --paths need --scenario; add it.")
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
-    hands = find_hands(read, named)
-    tracks = name_tracks(read, named, hands)
-    print_lines(reading_lines(read, named, hands))
+    tracks = name_tracks(read, named)
+    print_columns(reading_lines(read, named))
     if scenario is None:
-        _import_unplanned(read, named, stated, tracks, out, picture)
+        _import_alone(read, stated, tracks, out, picture)
     else:
-        _import(read, named, stated, tracks, scenario, (ends, unseen), (out, picture, paths))
+        order = _parse_order(ends, unseen)
+        _import_for_scenario(read, named.models, stated, tracks, scenario, order, out, picture, paths)
+    print_written(out, paths, picture)
 
 
-def _import(
-    log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
+def _import_for_scenario(
+    log: Any, models: Any, camera: Any, tracks: Any, scenario: str, order: Any, out: Path, picture: Any, paths: Any
 ) -> None:
+    from apo_bench import load_scenario
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.formats.observation_json import observation_form
+    from apo_bench.importers.recording.drawing import draw_recording
     from apo_bench.importers.recording.importing import import_recording
-    from apo_bench.importers.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
-    from apo_bench.importers.recording.show.text import PATH_HEAD, imported_lines, path_rows
+    from apo_bench.importers.recording.text import PATH_HEAD, imported_lines, path_rows
 
-    out, picture, paths = files
-    loaded = load_scenario(scenario)
-    stated = _stated(*order, len(loaded.assembly))
+    task = load_scenario(scenario)
+    require(
+        all(0 <= k < len(task.assembly) for k in order.unseen),
+        f"--unseen must hold operations from 1 to {len(task.assembly)}.",
+    )
     try:
-        imported = import_recording(tracks, camera, loaded, stated, log.file, objects.models)
+        imported = import_recording(tracks, camera, task, order, log.file, models)
     except InputError:
         if picture is not None:
-            draw_recording(unfit_drawing(log, tracks, camera, loaded), picture)
-            typer.echo(f"Wrote {picture}, as it was read")
+            draw_recording(f"{log.file}, {task.name}; it does not fit", tracks, camera.T_world_camera, [], picture)
+            typer.echo(f"Wrote {picture}, as the log was read")
         raise
-    mains = [operation.main for operation in loaded.assembly.operations]
+    mains = [operation.main for operation in task.assembly.operations]
     rests = [operation.rest for operation in imported.operations]
     if out.suffix.lower() == ".json":
-        from apo_bench.formats.json_forms import write_form
-        from apo_bench.formats.observation_json import observation_form
-
-        name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
+        name = scenario if scenario == task.name else str(Path(scenario).resolve())
         write_form(observation_form(imported.observation, name), out)
     else:
         _write_table(out, mains, rests, imported.observation.poses, camera)
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
-    if picture is not None:
-        draw_recording(drawing_of(imported, log, tracks, camera), picture)
-    _print_rests(imported.camera, mains, rests, tracks, [""])
-    print_lines(imported_lines(imported))
-    _print_written(out, paths, picture)
+    _show_rests(f"{log.file}, {task.name}", imported.arrangement.camera, mains, rests, tracks, picture)
+    print_columns(imported_lines(imported))
 
 
-def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.importers.recording.show.drawing import draw_recording, unplanned_drawing
-    from apo_bench.importers.recording.show.text import put_lines
-    from apo_bench.importers.recording.unplanned import goals_of, unplanned_recording
+def _import_alone(log: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
+    from apo_bench.importers.recording.unplanned import unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
-    parts = [put.part for put in recording.puts]
-    rests = [put.rest for put in recording.puts]
-    _write_table(out, parts, rests, goals_of(recording), camera)
-    if picture is not None:
-        draw_recording(unplanned_drawing(recording, log, tracks), picture)
-    _print_rests(recording.camera, parts, rests, tracks, put_lines(recording))
-    _print_written(out, picture)
+    parts = [placement.part for placement in recording.placements]
+    rests = [placement.rest for placement in recording.placements]
+    poses = [recording.camera.T_world_camera @ rest.T for rest in rests]
+    _write_table(out, parts, rests, poses, camera)
+    _show_rests(log.file, recording.camera, parts, rests, tracks, picture)
+    for k, placement in enumerate(recording.placements, start=1):
+        if placement.carries:
+            typer.echo(f"operation {k}: {placement.part} and {', '.join(placement.carries)} moved together")
 
 
-def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
+def _parse_order(ends: str | None, unseen: str | None) -> Any:
     from apo_bench.importers.recording.ordering import Stated
 
-    hidden = whole_numbers(unseen, "--unseen") if unseen else ()
-    require(
-        all(1 <= k <= operations for k in hidden),
-        f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.",
-    )
-    require(not ends or not hidden, "--ends and --unseen were given; give one of the two.")
-    return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
+    require(not ends or not unseen, "--ends and --unseen exclude each other; leave one of them out.")
+    hidden = parse_list(unseen, "--unseen", int) if unseen else ()
+    return Stated(parse_list(ends, "--ends", float) if ends else (), tuple(k - 1 for k in hidden))
 
 
-def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, further: list[str]) -> None:
-    """The camera, where each part rested after its operation, and further lines."""
-    from apo_bench.importers.recording.show.text import camera_lines, rest_lines
+def _show_rests(title: str, camera: Any, parts: list[str], rests: list[Any], tracks: Any, picture: Path | None) -> None:
+    """Print and draw the camera, and where each part rested after its operation."""
+    from apo_bench.importers.recording.drawing import draw_recording
+    from apo_bench.importers.recording.text import camera_lines, rest_lines
 
-    print_lines(camera_lines(camera))
-    times = {part: track.t for part, track in tracks.items()}
-    lines = rest_lines(list(zip(parts, rests, strict=True)), camera.T_world_camera, times)
-    typer.echo("\n" + "\n".join([*lines, *further]))
+    pairs = list(zip(parts, rests, strict=True))
+    print_columns(camera_lines(camera))
+    typer.echo("\n" + "\n".join([*rest_lines(pairs, camera.T_world_camera), ""]))
+    if picture is not None:
+        ended = [(part, rest.begins) for part, rest in pairs if rest is not None]
+        draw_recording(title, tracks, camera.T_world_camera, ended, picture)
 
 
-def _print_written(*paths: Path | None) -> None:
-    typer.echo("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None))
+def _write_table(path: Path, parts: list[str], rests: list[Any], poses: Any, camera: Any) -> None:
+    """Write poses as CSV; an operation that the log does not show has no rest."""
+    from apo_bench.importers.recording.text import OBSERVATION_HEAD, observation_rows
 
-
-def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
-    """Write goals as CSV; an operation that the log does not show has no rest."""
-    from apo_bench.importers.recording.importing import deviations
-    from apo_bench.importers.recording.show.text import OBSERVATION_HEAD, observation_rows
-
-    sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, goals, sizes, [rest is not None for rest in rests]))
+    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, poses, rests, camera))

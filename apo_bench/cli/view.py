@@ -1,14 +1,12 @@
-"""The command `apo-bench view`: a scenario or a finished trial, stepped through."""
+"""The command `apo-bench view`: a scenario or a finished trial, step by step."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import Port
-from apo_bench.cli.values import path_given
+from apo_bench.cli.shared import Port, SecretSeedFile, print_columns
 from apo_bench.errors import require
-from apo_bench.scenario.file import load_scenario
 
 
 def view_command(
@@ -16,33 +14,32 @@ def view_command(
         str, typer.Argument(metavar="TARGET", help="A scenario, by its name or file, or the folder of a sweep.")
     ],
     trial: Annotated[
-        int | None,
-        typer.Option(help="Of a folder: the line of trials.jsonl; default: the first failure."),
+        int | None, typer.Option(help="Line of trials.jsonl in the folder, from 1; default: the first failure.")
     ] = None,
     port: Port = None,
-    secret_seed_file: Annotated[
-        Path | None,
-        typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run it again."),
-    ] = None,
+    secret_seed_file: SecretSeedFile = None,
 ) -> None:
-    """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
-    from apo_bench.cli.trial_text import print_row
-    from apo_bench.simulation.scene.scene import build_scene
+    """Step through a scenario, or through a finished trial, which runs again for it.
+
+    Examples:
+      apo-bench view stick_in_tower
+      apo-bench view runs/mine --trial 12 --port 8080
+    """
+    from apo_bench import build_scene, load_scenario
     from apo_bench.trial.rollout import scenario_story
-    from apo_bench.viz.finished_trial import trial_again
+    from apo_bench.viz.trial_again import repeat_trial
+    from apo_bench.viz.trial_text import summary_lines
     from apo_bench.viz.viewing import choose_display, view
 
-    folder = Path(target)
-    if folder.is_dir():
-        place = choose_display(port)
-        row, rollout = trial_again(folder, trial, secret_seed_file)
-        print_row(row)
+    is_sweep = Path(target).is_dir()
+    require(
+        is_sweep or (trial, secret_seed_file) == (None, None),
+        f"--trial and --secret-seed-file belong to the folder of a sweep, got {target}; leave them out.",
+    )
+    display = choose_display(port)
+    if is_sweep:
+        record, rollout = repeat_trial(Path(target), trial, secret_seed_file)
+        print_columns(summary_lines(record, record["scenario"]))
     else:
-        for value, option in ((trial, "--trial"), (secret_seed_file, "--secret-seed-file")):
-            require(
-                value is None, f"{option}, which is for the folder of a sweep, was given for {target}; leave it out."
-            )
-        scenario = load_scenario(target)
-        place = choose_display(port)
-        rollout = scenario_story(build_scene(scenario))
-    view(rollout, place, port, typer.echo)
+        rollout = scenario_story(build_scene(load_scenario(target)))
+    view(rollout, display, port, typer.echo)

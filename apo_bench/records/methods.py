@@ -1,9 +1,9 @@
-"""Names of methods: a corrector, or a plan without one, and what the robot does; `names.resolve` imports the objects."""
+"""Names of methods: a corrector, or a plan without one, and what the robot does."""
 
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from apo_bench.errors import require, require_text, unknown
+from apo_bench.errors import require, require_known, require_text
 from apo_bench.names import resolve
 
 CORRECTORS = MappingProxyType(
@@ -27,7 +27,7 @@ REOBSERVING = ("contact-robust",)
 SIMULATED = MappingProxyType({"physics-settle": "apo_bench.simulation.scene.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
 WITHOUT_CORRECTOR = ("oracle", "uncorrected", "nominal")
-"""Plans without a corrector: the true poses, the observed poses, the scenario's own poses fitted to the observed ones."""
+"""Plans of the true poses, the observed poses, or the scenario's own poses fitted to the observed ones."""
 METHODS = (*WITHOUT_CORRECTOR, *CORRECTORS, *SIMULATED)
 """Methods by name."""
 SPIRAL_SEARCH = "spiral-search"
@@ -72,11 +72,9 @@ def checked_method(method: str) -> str:
         f"the method '{method}' was given; use one of +spiral and +probe, which includes it, once, as in "
         "contact+probe.",
     )
-    own = " Or give your own corrector as 'package.module:name'; +spiral or +probe may follow any of them."
-    require(
-        ":" in corrector or corrector in METHODS,
-        unknown("method", corrector or method, (*METHODS, SPIRAL_SEARCH)) + own,
-    )
+    if ":" not in corrector:
+        own = " Or give your own corrector as 'package.module:name'; +spiral or +probe may follow any of them."
+        require_known("method", corrector or method, (*METHODS, SPIRAL_SEARCH), rest=own)
     return SPIRAL_SEARCH if spiral and not probe and corrector == "uncorrected" else method
 
 
@@ -104,6 +102,23 @@ def may_reobserve(method: str) -> bool:
 def probes(method: str) -> bool:
     """Whether the robot of a method probes, so that it has a force-torque sensor at its wrist."""
     return parse_method(method).probe
+
+
+_AFFECTED_BY = MappingProxyType(
+    {
+        "noise": lambda method: not knows_truth(method),
+        "human_error_scale": lambda method: not knows_truth(method),
+        "contact_source": uses_contacts,
+        "max_reobservations": may_reobserve,
+        "ft_sensor": probes,
+        "assumed_robot_error": probes,
+    }
+)
+
+
+def affects(setting: str, method: str) -> bool:
+    """Whether a setting affects a method."""
+    return setting not in _AFFECTED_BY or _AFFECTED_BY[setting](method)
 
 
 def with_simulated(corrector: Any) -> Any:

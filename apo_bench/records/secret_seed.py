@@ -1,4 +1,4 @@
-"""A secret that enters every stream of chance, so that nobody without it can draw the trials of a sweep again."""
+"""A secret that enters every random stream, so that only its owner can draw the trials of a sweep again."""
 
 import hashlib
 import hmac
@@ -19,7 +19,7 @@ from apo_bench.io import read_bytes
 
 FEWEST_BYTES = 16
 _MOST_BYTES = 512
-"""Of a salt; 16 are 128 bits."""
+"""Of a secret seed; 16 are 128 bits."""
 _FEWEST_DIFFERENT = 8
 """Of 16 bytes at random fewer are different in one of 10^11 cases."""
 _FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
@@ -35,7 +35,7 @@ class SecretSeed:
 
     @cached_property
     def hash(self) -> str:
-        """16 hexadecimal digits that tell salts apart and reveal none."""
+        """16 hexadecimal digits that tell secret seeds apart and reveal none."""
         return hashlib.sha256(b"apo-bench/salt/name/" + self.secret).hexdigest()[:16]
 
     def words(self, seed: int, which: int) -> list[int]:
@@ -45,32 +45,32 @@ class SecretSeed:
 
 
 def read_secret_seed(path: str | Path) -> SecretSeed:
-    """The salt of a file.
+    """The secret seed of a file.
 
     Raises:
         InputError: There is no such file, it cannot be read, or it holds something else.
     """
-    match = _FORM.fullmatch(read_bytes(path, "salt file"))
+    match = _FORM.fullmatch(read_bytes(path, "secret seed file"))
     secret = bytes.fromhex(match[1].decode()) if match is not None else b""
     require(
         FEWEST_BYTES <= len(secret) <= _MOST_BYTES and len(set(secret)) >= _FEWEST_DIFFERENT,
-        f"'{path}' is not a salt file; it must hold {_TEXT}.",
+        f"'{path}' is not a secret seed file; it must hold {_TEXT}.",
     )
     return SecretSeed(secret)
 
 
 def secret_seed_of_sweep(path: str | Path, folder: str | Path) -> SecretSeed:
-    """The salt of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
+    """The secret seed of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
 
     Raises:
-        InputError: The file is no salt, cannot be read, or cannot be made.
+        InputError: The file is no secret seed, cannot be read, or cannot be made.
     """
     if os.path.lexists(path):
         return read_secret_seed(path)
     trials = Path(folder) / "trials.jsonl"
     require(
         not trials.exists() or trials.stat().st_size <= 0,
-        f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
+        f"the secret seed file '{path}' is not there, and '{folder}' holds trials already; give the secret seed file that they "
         "were drawn with, or choose another folder.",
     )
     make_secret_seed(Path(path))
@@ -95,7 +95,7 @@ def _open_privately(path: str, flags: int) -> int:
 
 
 def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:
-    """The hash of the salt that all rows were drawn with; None for none.
+    """The hash of the secret seed that all rows were drawn with; None for none.
 
     Raises:
         InputError: They were drawn with several.
@@ -103,28 +103,28 @@ def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:
     hashes = sorted({row.get("secret_seed") or "" for row in rows})
     require(
         len(hashes) <= 1,
-        f"the rows were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one salt at a time.",
+        f"the records were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one secret seed at a time.",
     )
     return hashes[0] or None if hashes else None
 
 
 def check_same_secret_seed(holder: str, at_hand: str | None, drawn: str | None) -> None:
-    """Raise an `InputError` unless a salt, or none, is the one that trials were drawn with.
+    """Raise an `InputError` unless a secret seed, or none, is the one that trials were drawn with.
 
     Args:
         holder: What holds the trials, in words.
-        at_hand: The hash of the salt at hand; None if there is none.
+        at_hand: The hash of the secret seed at hand; None if there is none.
         drawn: The hash in their rows.
     """
     if at_hand == drawn:
         return
-    require(drawn is not None, f"{holder} holds trials drawn without a salt; leave --secret-seed-file out.")
-    what = "no salt file was given" if at_hand is None else f"the salt file given is that of {at_hand}"
+    require(drawn is not None, f"{holder} holds trials drawn without a secret seed; leave --secret-seed-file out.")
+    what = "no secret seed file was given" if at_hand is None else f"the secret seed file given is that of {at_hand}"
     raise InputError(
-        f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --secret-seed-file."
+        f"{holder} holds trials drawn with the secret seed {drawn}, and {what}; give theirs with --secret-seed-file."
     )
 
 
 def describe_secret_seed(drawn: str | None) -> str:
-    """`with the salt 0123456789abcdef`, or `without a salt`."""
-    return f"with the salt {drawn}" if drawn else "without a salt"
+    """`with the secret seed 0123456789abcdef`, or `without a secret seed`."""
+    return f"with the secret seed {drawn}" if drawn else "without a secret seed"

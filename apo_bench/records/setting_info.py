@@ -1,4 +1,4 @@
-"""Facts about a setting of a trial besides its name, type and default."""
+"""Facts about one setting of a trial, and the check of its values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,20 +6,17 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, final
 
-from apo_bench.errors import InputError, require, shown, unknown
+from apo_bench.errors import require, require_known, require_text, shown
+from apo_bench.io import UNSHOWN
 
 
 @final
 @dataclass(frozen=True)
 class SettingInfo:
-    """One setting, as the command line, files and rows know it; a number there, times `scale`, is that in Python."""
+    """One setting, as the command line, files and records have it; a number there, times `scale`, is that in Python."""
 
     help: str = ""
     """Of its option, without default and full stop; empty if it has none."""
-    called: str = ""
-    """In words, for complaints; empty if what it may be is checked where it is used."""
-    meaning: str = ""
-    """How a complaint about a number ends."""
     choices: tuple[str, ...] = ()
     spelled: Callable[[str], str] | None = None
     """Checks a name and returns its canonical form."""
@@ -46,12 +43,6 @@ class SettingInfo:
     default: Any = None
 
     @property
-    def range(self) -> tuple[Any, Any]:
-        """The smallest and the largest number."""
-        (limits,) = self.kind.__metadata__
-        return limits.ge, limits.le
-
-    @property
     def words(self) -> str:
         """The name in prose."""
         return self.name.replace("_", " ")
@@ -69,30 +60,27 @@ class SettingInfo:
     def is_whole(self) -> bool:
         return getattr(self.kind, "__origin__", self.kind) is int
 
+    def check(self, value: object, called: str = "") -> None:
+        """Raise an `InputError` unless the setting may have this value, whatever the others are.
+
+        Args:
+            called: The setting in the message. Default: its name.
+        """
+        name = called or self.words
+        limits = getattr(self.kind, "__metadata__", (None,))[0]
+        if self.choices:
+            require_known(name, value if isinstance(value, str) else shown(value), self.choices)
+        elif self.is_text:
+            require_text(name, value)
+            is_shown = self.name == "scenario" or not UNSHOWN.search(str(value))
+            require(is_shown, f"{name} must not have control characters or half letters, got {value!r}.")
+        elif limits is not None and limits.ge is not None:
+            number = value if isinstance(value, Integral if self.is_whole else Real) else math.nan
+            kind = "a whole number" if self.is_whole else "a number"
+            fits = not isinstance(value, bool) and limits.ge <= number <= limits.le
+            require(fits, f"{name} must be {kind} from {limits.ge:.16g} to {limits.le:.16g}, got {shown(value)}.")
+
 
 def about(help: str = "", **more: Any) -> Mapping[str, Any]:
     """The metadata of a field that is a setting; `more` as in `SettingInfo`."""
     return {"info": SettingInfo(help, **more)}
-
-
-def check_value(info: SettingInfo, value: object, called: str = "", meaning: str = "") -> None:
-    """Raise an `InputError` unless a setting may be this; nothing is asked of one that is not `called` anything.
-
-    Args:
-        called, meaning: In place of those of the setting.
-    """
-    if info.choices:
-        if not isinstance(value, str) or value not in info.choices:
-            raise InputError(unknown(info.called, value if isinstance(value, str) else shown(value), info.choices))
-    elif info.called:
-        low, high = info.range
-        name = called or info.called
-        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-        require(
-            not info.is_whole or (isinstance(value, Integral) and low <= number <= high),
-            f"a {name} of {shown(value)} was given; whole numbers from {low} to {high} are allowed.",
-        )
-        if not low <= number <= high:
-            text = shown(value) if math.isnan(number) else f"{number:g}"
-            why = meaning or info.meaning
-            raise InputError(f"a {name} of {text} was given; a number from {low:g} to {high:g} is allowed, {why}.")

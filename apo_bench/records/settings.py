@@ -1,18 +1,13 @@
-"""The settings of a trial: the field `TrialConfig` states each once, with its range, its help and what else uses it.
-
-Columns of records, sweep axes, keys of sweep files, command-line options, environment arguments and the tables of the
-documentation are made from these fields. The file is long because everything about a setting stands in one place.
-"""
+"""The settings of a trial, each stated once: columns, sweep axes, file keys, options and tables are made from them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from numbers import Real
-from typing import Annotated, Any, Literal, Never, final, get_args, get_type_hints
+from typing import Annotated, Any, Literal, final, get_args, get_type_hints
 
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.errors import InputError, require, require_text
+from apo_bench.errors import require
 from apo_bench.records.contact_sources import checked_contact_source
 from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, checked_ft_sensor
 from apo_bench.records.methods import CORRECTOR, checked_method, probes
@@ -23,7 +18,7 @@ from apo_bench.records.robot_error import (
     checked_robot_error,
 )
 from apo_bench.records.secret_seed import SecretSeed
-from apo_bench.records.setting_info import SettingInfo, about, check_value
+from apo_bench.records.setting_info import SettingInfo, about
 
 ENV_ID = "APOReplay-v0"
 RECORD_SCHEMA = "apo-bench/record/1"
@@ -56,8 +51,6 @@ NOISE_LEVEL = SettingInfo(
     kind=NoiseSize,
 )
 """One number stands for `noise_mm` and `noise_deg`."""
-_PER_AXIS = "where 1 is a standard deviation of 1 mm and 1 degree per axis"
-_PER_RAY = "where 1 is a standard deviation of 1 mm per ray"
 
 
 @final
@@ -74,8 +67,6 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Standard deviation of the observed positions per axis, in mm",
-            called="noise in mm",
-            meaning=_PER_AXIS,
             usual="the noise level",
             key=True,
             drawn=True,
@@ -86,8 +77,6 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Standard deviation of the observed rotation vectors per axis, in degrees",
-            called="noise in degrees",
-            meaning=_PER_AXIS,
             usual="the noise level",
             key=True,
             drawn=True,
@@ -99,8 +88,6 @@ class TrialConfig:
         default=1.0,
         metadata=about(
             "Factor on the human error that the scenario states; 0 is an ideal human",
-            called="human error scale",
-            meaning="where 0 is an ideal human and 1 the human error that the scenario states",
             key=True,
             drawn=True,
             axis=True,
@@ -112,8 +99,6 @@ class TrialConfig:
         default=0.25,
         metadata=about(
             "Clearance per side between parts that fit, in mm",
-            called="clearance",
-            meaning="in mm per side",
             usual="the scenario's",
             key=True,
             axis=True,
@@ -126,7 +111,6 @@ class TrialConfig:
         metadata=about(
             "Where observed poses come from: noise-model, or depth-camera (estimated from simulated depth images; the "
             "noise level is then in mm per ray)",
-            called="pose source",
             choices=get_args(PoseSource),
             axis=True,
         ),
@@ -146,7 +130,6 @@ class TrialConfig:
         default="friction",
         metadata=about(
             "How the gripper holds parts: friction, or weld for an ideal gripper",
-            called="grasp",
             choices=("friction", "weld"),
             key=True,
             axis=True,
@@ -205,7 +188,6 @@ class TrialConfig:
         default=0,
         metadata=about(
             "How often a corrector may observe operations again",
-            called="number of reobservations",
             key=True,
             axis=True,
         ),
@@ -239,14 +221,12 @@ class TrialConfig:
         default=0.0,
         metadata=about(
             "Abstain from plans whose predicted success is lower; 0 executes every plan",
-            called="minimum predicted success",
-            meaning="where 0 executes every plan",
             key=True,
             axis=True,
         ),
     )
     """A plan with a lower `predicted_success` is not executed and does not count as a success."""
-    seed: Seed = field(default=0, metadata=about("Number of the trial", called="seed", key=True))
+    seed: Seed = field(default=0, metadata=about("Number of the trial", key=True))
     """Number of the trial: all methods meet the same layout, demonstration and noise at the same seed."""
     secret_seed: SecretSeed | None = field(
         default=None,
@@ -269,7 +249,6 @@ class TrialConfig:
         default="full",
         metadata=about(
             "full, or near-contact: simulate only the part of each motion in which parts may touch",
-            called="fidelity",
             choices=get_args(Fidelity),
             shared=True,
         ),
@@ -279,19 +258,14 @@ class TrialConfig:
     def __post_init__(self) -> None:
         for info in SETTINGS.values():
             value = getattr(self, info.name)
-            if info.is_text:
-                require_text(info.words, value)
-            elif isinstance(value, np.generic):
-                object.__setattr__(self, info.name, value.item())
-        for info in _CHECKED:
-            check(info.name, getattr(self, info.name), self.pose_source)
-            if info.spelled is not None:
-                object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
+            if isinstance(value, np.generic):
+                value = value.item()
+            info.check(value)
+            object.__setattr__(self, info.name, info.spelled(value) if info.spelled else value)
         check_together(self.fidelity, self.grasp)
         check_grip(probes(self.method), self.grasp)
         if self.pose_source == DEPTH_CAMERA:
-            if self.noise not in (USUAL, DEPTH_CAMERA):
-                refuse_noise(self.noise)
+            refuse_noise(*{self.noise} - {USUAL, DEPTH_CAMERA})
             object.__setattr__(self, "noise", DEPTH_CAMERA)
             object.__setattr__(self, "noise_deg", 0.0)
 
@@ -307,18 +281,15 @@ def _settings() -> Iterable[SettingInfo]:
 
 SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
 """Settings by name, in the order of the columns of a record."""
-_CHECKED = tuple(info for info in SETTINGS.values() if info.called or info.spelled)
 
 
-def check(name: str, value: object, pose_source: str = NOISE_MODEL, called: str = "") -> None:
+def check(name: str, value: object, called: str = "") -> None:
     """Raise an `InputError` unless a setting may have this value, whatever the others are.
 
     Args:
-        pose_source: What the noise level is of.
-        called: Name of the setting in the message; default: that of the setting.
+        called: The setting in the message. Default: its name.
     """
-    per_ray = name == "noise_mm" and pose_source == DEPTH_CAMERA
-    check_value(SETTINGS[name], value, called, _PER_RAY if per_ray else "")
+    SETTINGS[name].check(value, called)
 
 
 def check_together(fidelity: str, *grasps: str) -> None:
@@ -341,29 +312,21 @@ def check_grip(probes: bool, *grasps: str) -> None:
 
 def noise_pair(noise_level: float | Sequence[float], pose_source: str = NOISE_MODEL) -> tuple[float, float]:
     """A noise level in mm and in degrees: one number stands for both, a pair for each; per ray it is one, in mm."""
-    is_sequence = isinstance(noise_level, Iterable) and not isinstance(noise_level, str)
-    several: tuple[Any, ...] = tuple(noise_level) if is_sequence else (noise_level,)  # type: ignore[arg-type]
-    is_numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
-    numbers = tuple(map(float, several)) if is_numbers else ()
-    require(
-        pose_source != DEPTH_CAMERA or len(numbers) == 1,
-        f"the noise level {noise_level!r} was given with the pose source 'depth-camera'; give one number, mm per ray.",
-    )
-    require(
-        len(numbers) in (1, 2),
-        f"the noise level {noise_level!r} was given; give one number, or a pair of mm and degrees.",
-    )
-    mm = numbers[0]
-    deg = 0.0 if pose_source == DEPTH_CAMERA else numbers[-1]
-    check("noise_mm", mm, pose_source)
-    check("noise_deg", deg)
-    return mm, deg
+    is_several = isinstance(noise_level, Iterable) and not isinstance(noise_level, str)
+    several: tuple[Any, ...] = tuple(noise_level) if is_several else (noise_level,)  # type: ignore[arg-type]
+    per_ray = pose_source == DEPTH_CAMERA
+    allowed = "one number, mm per ray" if per_ray else "one number, or a pair of mm and degrees"
+    require(1 <= len(several) <= 2 - per_ray, f"noise level must be {allowed}, got {noise_level!r}.")
+    check("noise_mm", several[0], "noise level")
+    check("noise_deg", several[-1], "noise level")
+    return float(several[0]), 0.0 if per_ray else float(several[-1])
 
 
-def refuse_noise(*noises: object) -> Never:
-    """Raise an `InputError`: noise models were given with a pose source that draws no noise."""
-    names = ", ".join(f"'{noise}'" for noise in noises if isinstance(noise, str))
-    raise InputError(
+def refuse_noise(*noises: object) -> None:
+    """Raise an `InputError` if there is a noise model; for pose sources that draw no noise."""
+    names = ", ".join(noise for noise in noises if isinstance(noise, str))
+    require(
+        not noises,
         f"the noise {names or 'model'} was given together with the pose source 'depth-camera', which draws no pose "
-        "noise; the noise level is the noise of its rays in mm, so leave one of the two out."
+        "noise; the noise level is the noise of its rays in mm, so leave one of the two out.",
     )

@@ -119,6 +119,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         clearance_mm=top.clearance_mm,
         gap_mm=top.gap_mm,
         follows_site=frozenset(name for name, part in parts.items() if part.table.follows_site),
+        source=path,
     )
     return scenario, tuple(entry.attach for entry in entries)
 

@@ -148,6 +148,8 @@ class Scenario:
     """What may turn in each layout; drawn after the shifts."""
     follows_site: frozenset[str] = frozenset()
     """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
+    source: Path | None = None
+    """The file that it was read from."""
 
     def __post_init__(self) -> None:
         freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4), part_files=None, colors=None)

@@ -6,8 +6,7 @@ a contact's time constant of four steps, damping ratio 2. With a ratio of 1 a st
 rattles over an edge that should stop it.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -63,14 +62,3 @@ def set_contact(geoms: Iterable[Any], s: Physics) -> None:
     for geom in geoms:
         geom.solref[:2] = s.solref
         geom.solimp = s.solimp
-
-
-@contextmanager
-def without_log_file() -> Iterator[None]:
-    """Keep MuJoCo's warnings for a while from a file in the current folder, `MUJOCO_LOG.TXT`."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)

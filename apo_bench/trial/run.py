@@ -7,6 +7,7 @@ passes it on. Everything here is in m and rad; `outcome_columns` turns it into t
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, cast, final
 
 from apo_bench.arguments import check_arguments
@@ -15,6 +16,7 @@ from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigma
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
+from apo_bench.names import function_name
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
@@ -31,7 +33,7 @@ from apo_bench.records import (
     uses_contacts,
 )
 from apo_bench.records.run.validation import unwritable
-from apo_bench.scenario import scenario_names
+from apo_bench.scenario import Scenario, scenario_names
 from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
@@ -39,6 +41,7 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
 from apo_bench.trial.endings import end_record, record_misbehaviour, start_record
 from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.keywords import configure_trial
 from apo_bench.trial.nominal import move_nominal_poses
 from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import apply_method
@@ -83,48 +86,66 @@ class RunContext:
 
 @check_arguments
 def run_trial(
-    settings: TrialConfig,
+    config: TrialConfig | Scenario | str | Path,
     scene: Scene | None = None,
     *,
+    method: str | Callable[..., Any] | None = None,
     simulated: SimulatedDemonstration | None = None,
     content: str | None = None,
-    method: str | Callable[..., Any] | None = None,
     watch: Callbacks | None = None,
     cache: ReplayCache | None = None,
+    **settings: Any,
 ) -> TrialRecord:
-    """Run one trial.
+    """Run one trial, for example `run_trial("stick_in_tower", method="contact", noise_level=1, seed=7)`.
 
     Args:
-        scene: Compiled for scenario, clearance, grasp, arm and time step of `settings`. Default: compiled here.
+        config: A configuration, or a scenario (name, path or object) whose settings are the keywords.
+        scene: Compiled for scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
+        method: A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)`
+            poses in the world frame, [m]. Default: that of the configuration.
         simulated: The demonstration of this seed and human error scale. Default: simulated here.
         content: From `content_hash`. Default: computed here.
-        method: A corrector in place of the one that `settings` name.
         watch: As `Callbacks`.
         cache: As in `RunContext`.
+        settings: Settings of `TrialConfig` and `noise_level`, with a scenario.
+
+    Returns:
+        The record of the trial, a dict whose keys are columns.
 
     Raises:
-        InputError: The noise model, the contact source or the corrector is unknown or returns what it must not.
+        InputError: An unknown setting, a value that is not allowed, or a function that returns what it must not.
     """
-    scene = scene or scene_of(settings)
+    source: str | Scenario
+    if isinstance(config, TrialConfig):
+        require(not settings, f"{', '.join(settings)} was given together with a TrialConfig; put it into that.")
+        source = config.scenario
+    else:
+        source = config if isinstance(config, Scenario) else str(config)
+        config, loaded = configure_trial(config, **settings)
+        scene = scene or scene_of(config, loaded)
+    if method is not None:
+        config = replace(config, method=method if isinstance(method, str) else function_name(method))
+    scene = scene or scene_of(config)
     require(
-        settings.scenario == scene.scenario.name or settings.scenario not in scenario_names(),
-        f"the settings name the scenario '{settings.scenario}', the scene is of '{scene.scenario.name}'; build the "
+        config.scenario == scene.scenario.name or config.scenario not in scenario_names(),
+        f"the settings name the scenario '{config.scenario}', the scene is of '{scene.scenario.name}'; build the "
         "scene of the same scenario, or leave it out.",
     )
-    simulated = simulated or demonstration_of(settings, scene)
-    content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    record = start_record(settings, scene.scenario, config_hash(settings, content))
+    simulated = simulated or demonstration_of(config, scene)
+    content = content or content_hash(scene.scenario, source, scene.arm.files)
+    record = start_record(config, scene.scenario, config_hash(config, content))
     record |= {"demonstration": simulated.demonstration.code}
     if simulated.demonstration.code != "ok":
         return record | end_record(demonstration_failure(simulated.demonstration), success=None)
     truth = simulated.layout.poses
-    noise = noise_of(settings, scene, simulated)
-    observation = observe_demonstration(simulated, noise, settings.seed, settings.secret_seed)
-    given = _choose_contacts(settings, observation, truth)
+    noise = noise_of(config, scene, simulated)
+    observation = observe_demonstration(simulated, noise, config.seed, config.secret_seed)
+    given = _choose_contacts(config, observation, truth)
     reobserve = reobservations_of(
-        simulated, noise, settings.seed, settings.max_reobservations, settings.secret_seed, given.assembly
+        simulated, noise, config.seed, config.max_reobservations, config.secret_seed, given.assembly
     )
-    context = RunContext(scene, settings, method or parse_method(settings.method).corrector, watch, cache)
+    corrector = method if callable(method) else parse_method(config.method).corrector
+    context = RunContext(scene, config, corrector, watch, cache)
     return record | _plan_and_replay(context, observation, given, truth, reobserve)
 
 

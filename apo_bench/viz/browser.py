@@ -1,4 +1,4 @@
-"""A trial in a browser, by viser: stepped through with a slider and buttons; served on this machine only."""
+"""A rollout in a browser, by viser, with a slider and buttons; served to this machine only."""
 
 import io
 import time
@@ -26,9 +26,9 @@ _BUTTONS = (
     {"play / stop": "play", "moment back": "previous", "moment on": "next"},
     {"operation back": "previous operation", "operation on": "next operation"},
     {"demonstration": "previous segment", "replay": "next segment"},
-    {"names of faces": "faces", "goals": "goals"},
+    {"names of faces": "faces", "target poses": "goals"},
 )
-"""Label -> what `Cursor.press` is told."""
+"""Label -> key of `Cursor.press`."""
 
 
 def no_browser() -> str:
@@ -38,13 +38,13 @@ def no_browser() -> str:
     return ""
 
 
-def serve_story(
+def serve_rollout(
     rollout: Rollout, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False
 ) -> None:
-    """Serve a story until `ends` says so, or Ctrl-C.
+    """Serve a rollout until `ends` returns true, or Ctrl-C.
 
     Args:
-        say: Told where it is to be seen.
+        say: Prints the address.
 
     Raises:
         InputError: The port is taken or not allowed.
@@ -64,11 +64,11 @@ def serve_story(
 
 
 class Page:
-    """What one browser, or several, see: they share one place in the story."""
+    """The page that one or several browsers show; they share one place in the rollout."""
 
     def __init__(self, rollout: Rollout, port: int) -> None:
         self.cursor = Cursor(rollout)
-        self._asked = deque[str | int]()
+        self._requests = deque[str | int]()
         self._data = initial_state(rollout.scene.work, rollout.segments[0].start)
         self._server = _server(port)
         self._drawn: object = None
@@ -82,13 +82,13 @@ class Page:
             self._server.stop()
 
     def draw(self) -> None:
-        """Do what was asked for, and bring the page up to date if anything has changed."""
-        while self._asked:
-            asked = self._asked.popleft()
-            if isinstance(asked, str):
-                self.cursor.press(asked)
+        """Do what the browser requested, and update the page if anything changed."""
+        while self._requests:
+            request = self._requests.popleft()
+            if isinstance(request, str):
+                self.cursor.press(request)
             elif not self.cursor.playing:
-                self.cursor.go(asked)
+                self.cursor.go(request)
         state = (self.cursor.place, self.cursor.faces, self.cursor.shows_goals)
         if state == self._drawn:
             return
@@ -109,7 +109,7 @@ class Page:
         self._drawn = state
 
     def _handle(self, kind: ShapeKind, number: int) -> Any:
-        """What viser draws of a shape, made when one of its kind is first seen."""
+        """What viser draws of a shape; made when a shape of its kind first appears."""
         if (kind, number) not in self._shown:
             name = f"/{len(self._shown)}"
             if kind.label:
@@ -145,19 +145,17 @@ class Page:
         gui.set_panel_label("apo-bench view")
         self._words = gui.add_markdown("")
         self._slider = gui.add_slider("moment", 0, len(self.cursor.places) - 1, 1, 0)
-        self._slider.on_update(lambda event: self._asked.append(int(event.target.value)))
+        self._slider.on_update(lambda event: self._requests.append(int(event.target.value)))
         for keys in _BUTTONS:
             group = gui.add_button_group("", tuple(keys))
-            group.on_click(lambda event, keys=keys: self._asked.append(keys[event.target.value]))
+            group.on_click(lambda event, keys=keys: self._requests.append(keys[event.target.value]))
 
 
 def _server(port: int) -> Any:
     import viser
 
     try:
-        with redirect_stdout(io.StringIO()):  # it says where it is in a box of its own
+        with redirect_stdout(io.StringIO()):  # viser prints its address in a box
             return viser.ViserServer(host=HOST, port=port, label="apo-bench view", verbose=False)
     except OSError as error:
-        raise InputError(
-            f"--port {port} was given, which cannot be served ({error.strerror or error}); choose another one."
-        ) from error
+        raise InputError(f"--port {port} cannot be served ({error.strerror or error}); choose another one.") from error

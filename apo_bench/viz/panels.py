@@ -1,4 +1,4 @@
-"""Pictures beside each other, each with a title above and lines below."""
+"""Pictures side by side, each with a title above and lines below."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ class PanelLine(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """One picture, (height, width, 3), and what is written with it."""
+    """A picture, (height, width, 3), and what is written with it."""
 
     image: NDArray[Any]
     lines: Sequence[PanelLine]
@@ -26,7 +26,7 @@ class Panel(NamedTuple):
 
 
 def draw_panels(title: str, panels: Sequence[Panel]) -> Any:
-    """A figure of matplotlib whose axes have the pixels of each picture as units; all are of one size."""
+    """A figure of matplotlib whose axes have the pixels of each picture as units; all pictures have one size."""
     from matplotlib.figure import Figure
 
     height, width = panels[0].image.shape[:2]
@@ -42,7 +42,7 @@ def draw_panels(title: str, panels: Sequence[Panel]) -> Any:
         figure.text((i + 0.5) * share, 1 - 40 / whole, panel.title, ha="center", va="center", fontsize=11)
         for j, line in enumerate(panel.lines):
             y = (below - _LINE_PX * (j + 0.8)) / whole
-            if line.color is not None:
-                figure.text((i + 0.02) * share, y, "\u25a0", color=line.color, fontsize=14, va="center")
+            square = "white" if line.color is None else line.color
+            figure.text((i + 0.02) * share, y, "\u25a0", color=square, fontsize=14, va="center")
             figure.text((i + 0.045) * share, y, line.text, va="center", fontsize=10)
     return figure

@@ -1,10 +1,10 @@
-"""A plan in macros, step by step: one line per operation, and one JSON object.
+"""A plan step by step: one line for each operation, and one JSON object.
 
-Directions are those of the frame of the assembly at the nominal goals; what is measured stands in the last column
-alone, so that another motion parameter changes the line of its operation and no other.
+Directions are those of the frame of the assembly at the nominal poses. Only the last column depends on the target
+poses, so another pose changes the line of its operation and no other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from apo_bench.planning.insertion.arrival import Arrival, OperationMacros, turni
 from apo_bench.planning.insertion.macros import Macro
 from apo_bench.scenario import Grasp, Scenario, nominal_operations, nominal_start
 
-_MACROS = "apo-bench/macros/1"
+_SCHEMA = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
 
 
@@ -28,17 +28,23 @@ class PlanLine(NamedTuple):
     """Counted from 0."""
     undo: bool
     what: OperationMacros
-    leaves: Arrival
-    comes: Arrival
     came_from: str
     """The ODL of where the main part is taken from, or `start`."""
     relations: tuple[str, ...]
-    """What is made: R1, R2, .."""
+    """The relations that the step makes: R1, R2, .."""
     grasp: Grasp
-    goal: Array | None
-    """(4, 4), world, [m]; None of what is undone: it goes back to where it was."""
+    target: Array | None
+    """(4, 4), world, [m]; None of an undone operation, whose part goes back to where it was."""
     back_to: str
     """The ODL of that place; empty otherwise."""
+
+    @property
+    def leaves(self) -> Arrival:
+        return self.what.after if self.undo else self.what.before
+
+    @property
+    def comes(self) -> Arrival:
+        return self.what.before if self.undo else self.what.after
 
     @property
     def macros(self) -> tuple[Macro, ...]:
@@ -46,78 +52,62 @@ class PlanLine(NamedTuple):
 
     @property
     def trouble(self) -> str:
-        """What the plan knows to be wrong with the way in; empty if nothing is."""
+        """What is wrong with the insertion axis; empty if nothing is."""
         if self.comes.chain.locked:
-            return "locked: no straight way leads there"
-        return "" if self.comes.free else "no free way in was found"
+            return "locked: no straight motion leads there"
+        return "" if self.comes.free else "no free insertion axis"
 
 
 def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
-    """What the robot is asked to do, step by step."""
+    """The steps of a plan."""
     everything = nominal_operations(scenario)
     odls = plan.assembly.odls()
     relations = [plan.assembly.relations()[arc[0]] for arc in plan.assembly.arcs()]
     lines = []
     for (k, undo), T in zip(plan.schedule, plan.step_poses, strict=True):
-        what = everything[k]
-        before = spell(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
-        leaves, comes = (what.after, what.before) if undo else (what.before, what.after)
-        lines.append(
-            PlanLine(
-                operation=k,
-                undo=undo,
-                what=what,
-                leaves=leaves,
-                comes=comes,
-                came_from=f"T{k + 1}" if undo else before,
-                relations=tuple(
-                    f"R{i}" for i, of in enumerate(relations, start=1) if (of.lost if undo else of.made) == k
-                ),
-                grasp=scenario.grasps[k],
-                goal=None if undo else T,
-                back_to=before if undo else "",
-            )
-        )
+        main = everything[k].main
+        before = spell(odls[k - 1][main]) if k and main in odls[k - 1] else "start"
+        made = tuple(f"R{i}" for i, of in enumerate(relations, start=1) if (of.lost if undo else of.made) == k)
+        came_from, target, back_to = (f"T{k + 1}", None, before) if undo else (before, T, "")
+        lines.append(PlanLine(k, undo, everything[k], came_from, made, scenario.grasps[k], target, back_to))
     return tuple(lines)
 
 
 def plan_text(lines: Sequence[PlanLine]) -> list[str]:
     """A table of text, then what is wrong with single operations."""
-    table = [_HEADS, *(_cells(line) for line in lines)]
     wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
-    return [*columns(table), *([""] if wrong else []), *wrong]
+    return [*columns([_HEADS, *map(_cells, lines)]), *([""] if wrong else []), *wrong]
 
 
-def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
-    """What `json` can write: mm, degrees, operations from 1.
+def plan_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """The JSON object: mm, degrees, operations from 1.
 
     Args:
-        notes: What is to be said with it: what was assumed, and what speaks against the plan.
+        notes: Assumptions, and what speaks against the plan.
     """
     start = nominal_start(scenario)
     stages = (start, *placements(scenario.assembly, start, scenario.goals))
     forms = []
     for line in lines:
-        screw = turning_state(
-            scenario.assembly, line.comes, stages[line.operation if line.undo else line.operation + 1]
-        )
-        position, felt, across = line.comes.axes
-        goal = {"position_mm": None, "quaternion_wxyz": None} if line.goal is None else pose_form(line.goal)
+        stage = stages[line.operation if line.undo else line.operation + 1]
+        screw = turning_state(scenario.assembly, line.comes, stage)
+        position, guarded, across = (axes.tolist() for axes in line.comes.axes)
+        target = {"position_mm": None, "quaternion_wxyz": None} if line.target is None else pose_form(line.target)
+        departs = [_macro_form(line.leaves, macro) for macro in line.leaves.departs]
         forms.append(
             {
                 "operation": line.operation + 1,
                 "undo": line.undo,
                 "part": line.what.main,
                 "carries": list(line.what.carries),
-                "before": _state(line.leaves),
-                "after": _state(line.comes) | {"screw": list(screw.all), "rotation": list(screw.rotation)},
-                "macros": [_macro(line.leaves, macro) for macro in line.leaves.departs]
-                + [_macro(line.comes, macro) for macro in line.comes.macros],
+                "before": _state_form(line.leaves),
+                "after": _state_form(line.comes) | {"screw": list(screw.all), "rotation": list(screw.rotation)},
+                "macros": departs + [_macro_form(line.comes, macro) for macro in line.comes.macros],
                 "from": line.came_from,
-                "until": {"contact_source": list(line.relations), "back_to": line.back_to or None} | goal,
-                "guarded": felt.tolist(),
-                "position": position.tolist(),
-                "walls": across.tolist(),
+                "until": {"relations": list(line.relations), "back_to": line.back_to or None} | target,
+                "guarded": guarded,
+                "position": position,
+                "walls": across,
                 "line": {
                     "along": line.comes.line.direction.tolist(),
                     "travel_mm": round(1e3 * line.comes.line.travel_m, 6),
@@ -127,53 +117,45 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
                 "grasp": {"at_mm": (1e3 * line.grasp.point).tolist(), "across": line.grasp.across.tolist()},
             }
         )
-    return {"schema": _MACROS, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
+    return {"schema": _SCHEMA, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
 
 
 def _cells(line: PlanLine) -> tuple[str, ...]:
-    position, felt, across = line.comes.axes
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
+    macros = []
+    for macro in line.macros:
+        length = "" if macro.length_m is None else f" {1e3 * macro.length_m:.4g} mm"
+        macros.append(f"{macro.name} {direction(macro.direction)}{length}")
+    until = f"back at {line.back_to}"
+    if line.target is not None:
+        numbers = np.round([*(1e3 * line.target[:3, 3]), *pose.turn_deg(line.target)], 3) + 0.0
+        until = f"{' '.join(line.relations):11} {' '.join(f'{x:9.3f}' for x in numbers)}"
+    position, guarded, across = line.comes.axes
+    grasp = ", ".join(f"{x:.4g}" for x in np.round(1e3 * line.grasp.point, 6) + 0.0)
     return (
         str(line.operation + 1),
         f"undo: {name}" if line.undo else name,
         f"{line.leaves.state.letter} -> {line.comes.state.letter}",
-        ", ".join(_chain(line)) or ("-" if line.trouble else "put down"),
+        ", ".join(macros) or ("-" if line.trouble else "put down"),
         line.came_from,
-        _listed(direction(v) for v in felt),
-        _listed(direction(v).lstrip("+-") for v in position),
-        _listed(direction(v).lstrip("+-") for v in across),
-        f"{_point(line.grasp.point)} across {direction(line.grasp.across).lstrip('+-')}",
-        _until(line),
+        " ".join(map(direction, guarded)) or "-",
+        _list_axes(position),
+        _list_axes(across),
+        f"({grasp}) across {_list_axes([line.grasp.across])}",
+        until,
     )
 
 
-def _chain(line: PlanLine) -> Iterator[str]:
-    """`depart +x`, `insert-into +x 140 mm`: how far only where that is known before."""
-    for macro in line.macros:
-        far = "" if macro.length_m is None else f" {1e3 * macro.length_m:.4g} mm"
-        yield f"{macro.name} {direction(macro.direction)}{far}"
+def _list_axes(vectors: Iterable[Array]) -> str:
+    """Axes without their sign."""
+    return " ".join(direction(v).lstrip("+-") for v in vectors) or "-"
 
 
-def _until(line: PlanLine) -> str:
-    if line.goal is None:
-        return f"back at {line.back_to}"
-    numbers = np.round([*(1e3 * line.goal[:3, 3]), *pose.turn_deg(line.goal)], 3) + 0.0
-    return f"{' '.join(line.relations):11} {' '.join(f'{x:9.3f}' for x in numbers)}"
-
-
-def _listed(words: Iterator[str]) -> str:
-    return " ".join(words) or "-"
-
-
-def _point(p: Array) -> str:
-    return f"({', '.join(f'{v:.4g}' for v in np.round(1e3 * p, 6) + 0.0)})"
-
-
-def _state(arrival: Arrival) -> dict[str, Any]:
+def _state_form(arrival: Arrival) -> dict[str, Any]:
     return {"letter": arrival.state.letter, "translation": list(arrival.state)}
 
 
-def _macro(arrival: Arrival, macro: Macro) -> dict[str, Any]:
+def _macro_form(arrival: Arrival, macro: Macro) -> dict[str, Any]:
     return {
         "name": macro.name,
         "direction": macro.direction.tolist(),

@@ -1,50 +1,52 @@
 """A plan in a robot's terms: poses of tip or flange in the frame of its base, motions with guards, mm.
 
-The tip lies between the fingertips: z points ahead, x along the direction in which the fingers close. Each motion is a
-straight line `from` a pose `to` a pose. One that is guarded ends where contact is felt against its direction, which
-should be at `to`; it begins as far before as the plan comes from, or 5 mm where nothing else says so.
+The tip is between the fingertips: z points ahead, x along the direction in which the fingers close. Each motion is a
+straight line `from` a pose `to` a pose. A guarded motion ends where the robot measures contact against its direction,
+which should be at `to`; it begins as far before as the plan comes from, else 5 mm.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Plan, placements
+from apo_bench.assembly import Plan, Poses, placements
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.scenario.scenario import Grasp, Scenario
+from apo_bench.scenario import Grasp, Scenario
 from apo_bench.viz.plan_text import PlanLine
 
 _SCHEMA = "apo-bench/robot-plan/1"
-_GUARDED_FROM_M = 0.005
-"""A guarded motion whose length nothing else says begins so far before contact."""
-_BEYOND_M = 0.002
-"""Contact is sought this far beyond where it should be."""
-_ABOVE_M = 0.1
-"""A part is approached from so far above, and left by so far back along the tip."""
-_ALONG = 0.999
+_GUARDED_FROM_M = 0.005  # length of a guarded motion for which the plan states none
+_BEYOND_M = 0.002  # a guarded motion goes this far beyond the expected contact
+_ABOVE_M = 0.1  # the robot approaches a part from so far above, and leaves it by so far back along the tip
+_ALONG = 0.999  # cosine of directions that are the same
 
 
 def robot_form(
     lines: Sequence[PlanLine], plan: Plan, scenario: Scenario, frames: RobotFrames, notes: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """What `json` can write: one entry per step, undone steps too, mm and unit vectors.
+    """The JSON object: one entry for each step, undone steps too, mm and unit vectors.
 
     Args:
         lines: Of the plan, step by step.
-        notes: What is to be said with it.
+        notes: Assumptions, and what speaks against the plan.
     """
-    poses: Mapping[str, Array] = plan.start
-    to_base = pose.inverse(frames.T_world_base)
+    assembly = plan.assembly
+    poses = plan.start
     steps = []
-    history: list[Mapping[str, Array]] = []
+    history: list[Poses] = []
     for line in lines:
-        after = history.pop() if line.undo else _after(plan, line, poses)
-        history += [] if line.undo else [poses]
-        steps.append(_step(line, poses, after, plan, frames))
+        if line.target is None:
+            after = history.pop()
+        else:
+            history.append(poses)
+            one = type(assembly)(assembly.solids, (assembly.operations[line.operation],), assembly.fixed)
+            after = placements(one, poses, line.target[None])[0]
+        steps.append(_step(line, poses[line.what.main], after[line.what.main], plan, frames))
         poses = after
+    to_base = pose.inverse(frames.T_world_base)
     return {
         "schema": _SCHEMA,
         "scenario": scenario.name,
@@ -66,26 +68,9 @@ def robot_form(
     }
 
 
-def _after(plan: Plan, line: PlanLine, poses: Mapping[str, Array]) -> Mapping[str, Array]:
-    """Where every part is when a step is done."""
-    assert line.goal is not None
-    return placements(
-        type(plan.assembly)(plan.assembly.solids, (plan.assembly.operations[line.operation],), plan.assembly.fixed),
-        poses,
-        line.goal[None],
-    )[0]
-
-
-def _step(
-    line: PlanLine,
-    poses: Mapping[str, Array],
-    after: Mapping[str, Array],
-    plan: Plan,
-    frames: RobotFrames,
-) -> dict[str, Any]:
+def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFrames) -> dict[str, Any]:
+    """A step that takes its main part from one pose to another, (4, 4), world, [m]."""
     part = line.what.main
-    here = poses[part]
-    goal = after[part]
     grip = tip_in_part(line.grasp, here)
     width = float(np.abs(line.grasp.across) @ np.ptp(plan.assembly.solids[part].bounds, axis=0))
     tip = here @ grip
@@ -102,14 +87,11 @@ def _step(
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
         "pick": {
-            "above": tip_form(_shifted(tip, UP if line.grasp.ahead is None else -tip[:3, 2], _ABOVE_M), frames),
+            "above": tip_form(_shift(tip, UP if line.grasp.ahead is None else -tip[:3, 2], _ABOVE_M), frames),
             "at": tip_form(tip, frames),
         },
-        "motions": [
-            *_departs(line, here, grip, frames),
-            *_arrives(line, goal, grip, frames),
-        ],
-        "leave": tip_form(_shifted(end, end[:3, 2], -_ABOVE_M), frames),
+        "motions": [*_departs(line, here, grip, frames), *_arrives(line, goal, grip, frames)],
+        "leave": tip_form(_shift(end, end[:3, 2], -_ABOVE_M), frames),
         "part_at_goal": pose_form(pose.inverse(frames.T_world_base) @ goal, frames),
         "trouble": line.trouble or None,
     }
@@ -127,33 +109,31 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
 
 
 def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
-    """The motions by which the part leaves the contacts that it is in, one after the other."""
+    """The motions by which the part leaves its contacts, one after the other."""
     motions = []
-    to = here
+    end = here
     for macro in line.leaves.departs:
-        at = to
+        begin = end
         way = here[:3, :3] @ line.leaves.own(macro.direction)
-        to = _shifted(at, way, macro.length_m or _GUARDED_FROM_M)
-        motions.append(_motion(macro.name, False, at, to, way, grip, frames))
+        end = _shift(begin, way, macro.length_m or _GUARDED_FROM_M)
+        motions.append(_motion(macro.name, False, begin, end, way, grip, frames))
     return motions
 
 
 def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """The motions by which the part comes to its goal: the last one ends there, each where the next one begins."""
-    way_in = goal[:3, :3] @ line.comes.line.direction
+    axis = goal[:3, :3] @ line.comes.line.direction
     macros = list(line.comes.macros)
     if not macros:
-        return [
-            _motion("put down", False, _shifted(goal, way_in, -line.comes.line.travel_m), goal, way_in, grip, frames)
-        ]
+        return [_motion("put down", False, _shift(goal, axis, -line.comes.line.travel_m), goal, axis, grip, frames)]
     motions = []
     begin = goal
     ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]
-    # the first motion along the way in is as long as the plan's own way; others as long as their macro says
-    along = next((i for i, way in enumerate(ways) if way @ way_in > _ALONG), None)
+    # the first motion along the insertion axis is as long as that; others as long as their macro states
+    along = next((i for i, way in enumerate(ways) if way @ axis > _ALONG), None)
     for i, (macro, way) in reversed(list(enumerate(zip(macros, ways, strict=True)))):
         end = begin
-        begin = _shifted(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
+        begin = _shift(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
         motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
     return motions[::-1]
 
@@ -180,10 +160,11 @@ def tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
 
 
 def pose_form(T: Array, frames: RobotFrames) -> dict[str, Any]:
+    """A pose in mm, with the quaternion in the order of the robot."""
     packed = pose.pack(T)
     q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)
     return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}
 
 
-def _shifted(T: Array, way: Array, far: float) -> Array:
+def _shift(T: Array, way: Array, far: float) -> Array:
     return pose.at(far * way) @ T

@@ -1,4 +1,4 @@
-"""Where somebody is who steps through a trial, and what is shown there: the same in a window and in a browser."""
+"""The place of a person who steps through a rollout, and what is shown there, in a window and in a browser."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, PartFace, placements
+from apo_bench.assembly import PartFace, placements
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.overlay import Color, Overlay, Snapshot
@@ -20,17 +20,17 @@ _COLORS: dict[str, tuple[str, Color]] = {
     AS_CORRECTED: ("green", (0.15, 0.7, 0.3)),
     AS_TRUE: ("violet", (0.55, 0.35, 0.85)),
 }
-"""Of goals."""
+"""Poses -> name and value of their colour."""
 
 
 @final
 @dataclass(eq=False)
 class Cursor:
-    """One moment of a story, whose segments follow each other; methods move it, `snapshot` says what is there."""
+    """A moment of a rollout, whose segments follow each other; methods move it, `snapshot` shows what is there."""
 
     rollout: Rollout
     place: int = 0
-    """The number of the moment, from 0, through all segments."""
+    """Number of the moment, from 0, through all segments."""
     playing: bool = False
     faces: Faces = "this operation"
     shows_goals: bool = False
@@ -38,6 +38,7 @@ class Cursor:
 
     def __post_init__(self) -> None:
         self.places = [(segment, moment) for segment in self.rollout.segments for moment in segment.moments]
+        self._assembly = self.rollout.scene.scenario.assembly
 
     @property
     def segment(self) -> Segment:
@@ -48,15 +49,11 @@ class Cursor:
         return self.places[self.place][1]
 
     @property
-    def _assembly(self) -> Assembly:
-        return self.rollout.scene.scenario.assembly
-
-    @property
     def _is_last(self) -> bool:
         return self.moment is self.segment.moments[-1]
 
     def snapshot(self) -> Snapshot:
-        """What is to be seen here."""
+        """What is shown here."""
         return Snapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
 
     def press(self, key: str) -> None:
@@ -78,19 +75,19 @@ class Cursor:
             self.go(self.place + (1 if way == "next" else -1))
 
     def go(self, place: int) -> None:
-        """To a moment by its number; beyond an end to the end."""
+        """Go to a moment by its number; beyond an end to the end."""
         self.place = min(max(place, 0), len(self.places) - 1)
         self._played_s = self.moment.time_s
 
     def pass_time(self, seconds: float) -> None:
-        """Go on in real time, if that is asked for; it stops at the end of the segment."""
+        """Play on in real time, up to the end of the segment."""
         self._played_s += seconds
         while self.playing and not self._is_last and self.places[self.place + 1][1].time_s <= self._played_s:
             self.place += 1
         self.playing = self.playing and not self._is_last
 
     def words(self) -> tuple[str, ...]:
-        """What is done here, the force, how far goals and the part are from the true goal; at the end, how it ended."""
+        """The phase, the force, how far target poses and the part are from the true pose; at the end, the result."""
         moment = self.moment
         ending = self.segment.ending
         k = moment.phase.operation
@@ -106,11 +103,11 @@ class Cursor:
         return tuple(words)
 
     def _offsets(self, k: int) -> list[str]:
-        """How far goals and the part are from the true goal of an operation, in its own frame."""
+        """How far poses and the part are from the true pose of an operation, in its own frame."""
         if AS_TRUE not in self.rollout.goals:
             return []
-        true = self.rollout.goals[AS_TRUE][k]
-        placed = {name: goals[k] for name, goals in self.rollout.goals.items() if name != AS_TRUE}
+        placed = {name: poses[k] for name, poses in self.rollout.goals.items()}
+        true = placed.pop(AS_TRUE)
         placed["as it is now"] = part_poses(self.segment, self.moment)[self._assembly.operations[k].main]
         lines = []
         for name, T in placed.items():
@@ -119,11 +116,11 @@ class Cursor:
             lines.append(f"{name}: {mm:.2f} mm, {np.degrees(np.linalg.norm(twist[3:])):.2f} degrees off")
         return lines
 
-    def _jump(self, belongs: Sequence[Hashable], way: str) -> None:
-        """To the first moment of the next group of moments, or of the one before; `belongs` names that of each."""
-        begins = [i for i in range(len(belongs)) if i == 0 or belongs[i] != belongs[i - 1]]
+    def _jump(self, groups: Sequence[Hashable], way: str) -> None:
+        """Go to the first moment of the next or the previous group; `groups` has that of each moment."""
+        begins = [i for i in range(len(groups)) if i == 0 or groups[i] != groups[i - 1]]
         if way == "next":
-            self.go(next((i for i in begins if i > self.place), len(belongs)))
+            self.go(next((i for i in begins if i > self.place), len(groups)))
         else:
             self.go(max((i for i in begins if i < self.place), default=0))
 
@@ -136,7 +133,7 @@ class Cursor:
         return tuple(dict.fromkeys(of for contact in contacts for of in contact))
 
     def _overlays(self) -> tuple[Overlay, ...]:
-        """What was moved up to here, where goals put it."""
+        """The parts that moved up to here, where target poses put them."""
         k = self.moment.phase.operation
         if k is None or not self.shows_goals:
             return ()

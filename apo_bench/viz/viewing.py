@@ -1,4 +1,4 @@
-"""A story to be looked at: in MuJoCo's window where there is a display, else in a browser."""
+"""The choice between MuJoCo's window and a browser to step through a rollout."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -6,39 +6,39 @@ from typing import Literal
 from apo_bench.errors import InputError, require
 from apo_bench.simulation.film.window import no_window, step_in_window
 from apo_bench.trial.rollout import Rollout
-from apo_bench.viz.browser import PORT, no_browser, serve_story
+from apo_bench.viz.browser import PORT, no_browser, serve_rollout
 from apo_bench.viz.stepping import Cursor
 
 Display = Literal["window", "browser"]
 
 
 def choose_display(port: int | None) -> Display:
-    """Where it can be shown; asked before anything is run.
+    """Where a rollout can be shown; commands ask before they run anything.
 
     Args:
-        port: A person who names one wants a browser.
+        port: Of a browser, if the user names one.
 
     Raises:
-        InputError: Neither is possible.
+        InputError: Neither a window nor a browser can show it.
     """
-    require(port is None or 1 <= port <= 65535, f"--port {port} was given; a whole number from 1 to 65535 is allowed.")
+    require(port is None or 1 <= port <= 65535, f"--port must be from 1 to 65535, got {port}.")
     if port is None and not no_window():
         return "window"
     missing = no_browser()
-    require(not missing or port is None, f"--port {port} was given, which is for a browser, but {missing}.")
+    require(not missing or port is None, f"--port {port} needs a browser, but {missing}.")
     if missing:
         raise InputError(
-            f"{no_window()}, and for a browser {missing}. `apo-bench run .. --video FILE.mp4` "
-            "and `apo-bench inspect poses` need neither."
+            f"{no_window()}, and for a browser {missing}. `apo-bench run .. --video FILE.mp4` and "
+            "`apo-bench inspect poses` need neither."
         )
     return "browser"
 
 
 def view(rollout: Rollout, display: Display, port: int | None, say: Callable[[str], None]) -> None:
-    """Show it until a person closes the window, or Ctrl-C."""
+    """Show a rollout until a person closes the window, or presses Ctrl-C."""
     try:
         if display == "browser":
-            serve_story(rollout, PORT if port is None else port, say)
+            serve_rollout(rollout, PORT if port is None else port, say)
         else:
             cursor = Cursor(rollout)
             step_in_window(rollout.scene, rollout.assembled, cursor.snapshot, cursor.press, cursor.pass_time)

@@ -81,12 +81,6 @@ def test_a_slide_sinks_in_its_dovetail_and_gets_room_between_the_walls() -> None
         assert found[f"slide.lean_p on {base}.slot_p"] == pytest.approx(c + 2 * c * sine, abs=1e-5)
 
 
-@pytest.mark.parametrize("name", ["carried_bridge", "pocket_table", "wedge_under_roof", "gearbox"])
-def test_in_all_other_scenarios_it_is_the_clearance(name: str) -> None:
-    """Opposite walls, or nothing that bounds the gap; shafts in holes have a play of their own."""
-    assert set(plays(name).values()) <= {CLEARANCE_MM}
-
-
 def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, limit_m: float) -> Poses | None:
     """The poses where a motion, taken so far, gets the parts as they are made that deep into each other.
 

@@ -29,13 +29,6 @@ def test_a_twist_in_a_frame_of_the_world_moves_every_goal_alike() -> None:
     assert_allclose(GOALS @ pose.exp(ways @ c), P @ pose.exp(c) @ pose.inverse(P) @ GOALS, atol=1e-12)
 
 
-def test_without_a_frame_it_is_the_one_of_the_part_and_locally_only_axes_count() -> None:
-    assert_allclose(SharedError("cube", (0, 2), C).ways(GOALS), np.tile(np.eye(6), (2, 1, 1)))
-    c = np.array([1e-3, 2e-3, -3e-3, 0.0, 0.0, 0.0])
-    moved = GOALS @ pose.exp(SharedError("drift", (0, 1, 2), C, P, local=True).ways(GOALS) @ c)
-    assert_allclose(moved[:, :3, 3] - GOALS[:, :3, 3], np.tile(P[:3, :3] @ c[:3], (3, 1)), atol=1e-15)
-
-
 def test_what_is_shared_stands_beside_the_diagonal() -> None:
     own = np.tile(np.diag(np.repeat([1e-3, 0.01], 3) ** 2), (3, 1, 1))
     camera = SharedError("camera", (0, 2), C, P)
@@ -66,15 +59,3 @@ def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     freedom = 6 * len(scene.goals)
     assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 600) + 0.02 * freedom)
     assert np.var(square) == pytest.approx(2 * freedom, rel=0.25)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: SharedError("camera", (0, 0), C), "each operation once"),
-        (lambda: SharedError("camera", (0, 1), C, correlation=np.eye(3)), r"shape \(2, 2\) is needed"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(make, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from apo_bench import SweepConfig
-from apo_bench.benchmark.analysis import Cell, tally
+from apo_bench.benchmark.analysis import ConditionResult, tally
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from benchmarks import headline
@@ -111,7 +111,7 @@ def test_the_summary_is_the_same_on_every_page_and_that_of_the_rows(page: Path) 
     assert (page.parent / picture.group(1)).exists()
 
 
-def cell(method: str, successes: int, **more: Any) -> Cell:
+def cell(method: str, successes: int, **more: Any) -> ConditionResult:
     """Ten trials at 1 mm, no human error."""
     first = next(c for c in tally(kept_rows()) if c.scenario == "stick_in_tower")
     plain = replace(first, human_error_scale=0.0, noise_mm=1.0, noise_deg=1.0, trials=10, excluded=0)

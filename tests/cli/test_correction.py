@@ -42,6 +42,12 @@ def aside(folder: Path, mm: float) -> Path:
     return path
 
 
+def planned(path: Path) -> np.ndarray:
+    """The target poses in the file of a plan."""
+    entries = json.loads(path.read_text())["operations"]
+    return np.array([pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in entries])
+
+
 @pytest.mark.parametrize("name", ["gearbox", "wedge_under_roof"])
 def test_a_scenario_is_explained(capsys: pytest.CaptureFixture[str], name: str) -> None:
     code, out, err = run(capsys, "inspect", "dof", name, "--json")
@@ -60,16 +66,7 @@ def test_an_explanation_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     total = "the contacts fix 21 of 30 directions; 9 are free and 12 of 33 equations redundant"
     assert lines[0] == f"vanished_fixture: {total}"
     castle2 = "y, z, roll, pitch, yaw fixed by the table and the cube (R3, R4 until operation 4)"
-    assert f"3 castle2: {castle2}; x free, kept as seen, 2.00 mm" in lines
-
-
-def test_free_directions_in_units(capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = run(capsys, "inspect", "dof", "stick_in_tower", "--json", "--deviation-mm", "3", "--deviation-deg", "2")
-    x, y, yaw = json.loads(out)["operations"][0]["free"]
-    assert (x["name"], x["twist_mm_deg"], x["deviation_mm"]) == ("x", [1, 0, 0, 0, 0, 0], pytest.approx(3.0))
-    assert (y["name"], y["deviation_mm"], y["with"]) == ("y", pytest.approx(np.sqrt(3.0)), [2, 3])
-    assert (yaw["twist_mm_deg"], yaw["point_mm"]) == ([0, 0, 0, 0, 0, 1], pytest.approx([0, 0, 0]))
-    assert yaw["deviation_deg"] == pytest.approx(2 / np.sqrt(3.0))
+    assert f"3 castle2: {castle2}; x free, kept as observed, 2.00 mm" in lines
 
 
 def test_an_observation_is_explained_where_it_is_corrected_to(capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,7 +82,7 @@ def test_an_observation_is_explained_where_it_is_corrected_to(capsys: pytest.Cap
     assert 0.0 < found["predicted_success"] < 1.0
 
 
-def test_what_was_left_out_is_not_said_to_be_kept_as_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_pose_that_was_left_out_is_not_kept_as_observed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """castle2 is seen 400 mm aside: its free direction x is known to no more than 50 mm, not to the 2 mm of the camera,
     and both programs correct by the same method."""
     path = str(aside(tmp_path, 400.0))
@@ -122,29 +119,13 @@ def test_a_correction_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, *asked(SEEN))
     assert (code, err) == (0, "")
     for said in (
-        "ended        every contact holds within 0.1 mm",
-        "mm as seen, 0.000 mm corrected",
+        "every contact holds within 0.1 mm",
+        "mm observed, 0.000 mm corrected",
         "13 degrees of freedom",
-        "explained by the stated noise",
         "the contacts fix 13 of 18 directions",
     ):
         assert said in out
     assert "assumed" not in out
-
-
-def test_assumed_noise_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path = tmp_path / "bare.csv"
-    bare = [",".join(line.split(",")[:9]) for line in SEEN.read_text(encoding="utf-8").splitlines()]
-    path.write_text("\n".join(bare), encoding="utf-8")
-    _, out, _ = run(capsys, *asked(path, "--deviation-mm", "2.5"))
-    assert "standard deviation of 2.5 mm and 1 deg per axis, assumed where the file states none" in out
-    assert json.loads(run(capsys, *asked(path, "--json"))[1])["deviations_assumed"] is True
-
-
-def planned(path: Path) -> np.ndarray:
-    """The target poses in the file of a plan."""
-    entries = json.loads(path.read_text())["operations"]
-    return np.array([pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in entries])
 
 
 @pytest.mark.parametrize("ending", ["csv", "json"])
@@ -180,15 +161,13 @@ def test_what_happens_in_doubt(
     assert (made["test_after"] or {}).get("passes") == (True if doubt == "drop" else None)
     assert made["test"]["ambiguous"] == ([] if doubt == "apply" else ["R4"])
     assert out.exists() == (code == 0)
-    assert bool(err) == (code != 0)
+    assert err == ""
     if doubt == "drop":
         assert (made["rank"], made["freedom"], made["explanation"]["rank"]) == (11, 7, 11)
     if code:
         assert made["operations"] is None
     words = run(capsys, *asked(path, "--if-doubtful", doubt))[1]
     assert ("R4 may be wrong" in words) == (doubt != "apply")
-    without = [line for line in words.splitlines() if line.startswith("test without")]
-    assert [line.endswith("explained by the stated noise") for line in without] == [True] * (doubt == "drop")
 
 
 def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -213,8 +192,8 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--if-doubtful", "maybe"), "apply, warn, refuse or drop is allowed"),
-        (("--if-doubtful", "drop", "--method", "paper"), "only contact can be told what to do"),
+        (("--if-doubtful", "maybe"), "Known: apply, drop, refuse, warn"),
+        (("--if-doubtful", "drop", "--method", "paper"), "--if-doubtful needs --method contact"),
         (("--deviation-mm", "0"), "deviation_mm 0 was given; a number from 0.0001 to 10000 is allowed"),
     ],
 )
@@ -231,7 +210,7 @@ def test_what_was_seen_is_not_written_over(capsys: pytest.CaptureFixture[str], t
     link = tmp_path / "link.csv"
     path.write_bytes(SEEN.read_bytes())
     link.symlink_to(path)
-    for out, words in ((path, "is a file that is read; name another"), (link, "a symbolic link")):
+    for out, words in ((path, "is a file that the command reads"), (link, "a symbolic link")):
         code, said, err = run(capsys, *asked(path, "--out", str(out)))
         assert (code, said, words in err) == (2, "", True)
     assert path.read_bytes() == SEEN.read_bytes()

@@ -45,7 +45,7 @@ def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.Ca
         found = read_observation(folder / out, NAME)
         assert np.abs(pose.log(pose.inverse(wanted) @ found.poses)[:, :3]).max() < 1e-3
     said = capsys.readouterr().out
-    assert "read as  lengths in mm; quaternions by the names of the columns" in " ".join(said.split("\n")[1].split(" "))
+    assert "read as  quaternions as wxyz" in " ".join(said.split("\n")[1].split(" "))
     assert (folder / "p.png").stat().st_size > 10_000
     assert (folder / "p.csv").read_text(encoding="utf-8").startswith("operation,part,t_s,x_mm")
     assert json.loads((folder / "a.json").read_text(encoding="utf-8"))["scenario"] == NAME
@@ -55,9 +55,9 @@ def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.Ca
     ("more", "sentence"),
     [
         (("--out", "a.json"), "need --scenario"),
-        (("--out", "log.csv", "--scenario", NAME), "is a file that is read"),
+        (("--out", "log.csv", "--scenario", NAME), "is a file that the command reads"),
         (("--out", "a.json", "--scenario", NAME, "--unseen", "9"), "operations from 1 to"),
-        (("--out", "a.json", "--scenario", NAME, "--ends", "1,2", "--unseen", "1"), "give one of the two"),
+        (("--out", "a.json", "--scenario", NAME, "--ends", "1,2", "--unseen", "1"), "exclude each other"),
     ],
 )
 def test_a_request_that_contradicts_itself_is_one_sentence(
@@ -77,6 +77,6 @@ def test_a_log_that_is_refused_is_drawn_as_it_was_read(folder: Path, capsys: pyt
     assert run(folder, *out, "--picture", str(folder / "p.png")) == 2
     said = capsys.readouterr()
     assert "no contact fits as it is stated" in said.err
-    assert "p.png, as it was read" in said.out
+    assert "p.png, as the log was read" in said.out
     assert (folder / "p.png").stat().st_size > 10_000
     assert not (folder / "a.json").exists()

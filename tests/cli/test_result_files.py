@@ -22,9 +22,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits the size
 ROOT = Path(__file__).parent.parent.parent
 LOG = f"{ROOT}/docs/recording.csv --format csv --camera camera.toml"
 COMMANDS = {
-    "graph stick_in_tower --out graph.svg": "graph.svg",
-    f"plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
-    f"noise still {LOG} --out still.toml --picture still.png": "still.toml still.png",
+    "inspect graph stick_in_tower --out graph.svg": "graph.svg",
+    f"inspect plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
     "arm check six_axis block_on_block --layouts 1 --out arm.png": "arm.png",
     "noise fit --estimates estimates.csv --truth truth.csv --out fit.toml --residuals fit.csv --picture fit.png": (
         "fit.toml fit.csv fit.png"
@@ -32,13 +31,13 @@ COMMANDS = {
     f"recording import {LOG} --objects objects.toml --scenario stick_in_tower --out seen.json --picture seen.png "
     "--paths seen_paths.csv": "seen.json seen.png seen_paths.csv",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
-    "replay block_on_block --save-observation saved.json --video film.gif --fidelity near-contact": "saved.json film.gif",
+    "run block_on_block --save-observation saved.json --video film.gif --fidelity near-contact": "saved.json film.gif",
     "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",
-    "scenario new --parts block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
+    "scenario new block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
     "leaderboard entries --out page.md": "page.md page.png",
     "report rows --pictures 0": (
-        "rows/report.html rows/tables/rows.parquet rows/tables/cells.csv "
-        "rows/tables/cells.parquet rows/figures/success_over_level.svg"
+        "rows/report.html rows/tables/records.parquet rows/tables/conditions.csv "
+        "rows/tables/conditions.parquet rows/figures/success_over_noise_level.svg"
     ),
     "compare rows rows --out compared": "compared/compare.html compared/agreement.csv compared/agreement.parquet",
 }

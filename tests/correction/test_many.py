@@ -10,19 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import ContactCorrector, Correction, InputError, Observation, correct, correct_many
-from apo_bench.assembly import Gap
-from apo_bench.assembly.equations import equations
-from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.batches import BATCH
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.projected_contacts import project_vertices
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import pose
 from tests import scenes
-from tests.correction.checks.test_consistency import shifted
 from tests.correction.solvers.test_large import of_problem
 from tests.correction.solvers.test_manifold import crooked, scales, twisted
-from tests.correction.solvers.test_walls import walled
 
 
 def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) -> list[Observation]:
@@ -57,80 +49,6 @@ def test_many_are_one_after_the_other(build: Callable[[], scenes.Scene]) -> None
     seen = draws(build(), 8)
     corrector = ContactCorrector()
     check_same(correct_many(seen, contact), [corrector(one) for one in seen])
-
-
-def laid_together(scene: scenes.Scene, goals: Array) -> CompactEquations:
-    start = np.array([scene.start[part] for part in scene.assembly.solids])
-    return project_vertices(scene.assembly, start, pattern(scene.assembly).plane, goals).system
-
-
-@pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])
-def test_vertices_of_either_face(name: str) -> None:
-    """Corners of the manipulated face are laid onto the other one at each observation's own goals."""
-    scene = scenes.ALL[name]()
-    laid = pattern(scene.assembly).laid
-    assert laid.any()
-    assert not laid.all()
-    goals = np.array([one.poses for one in draws(scene, 5, 10.0, 8.0)])
-    together = laid_together(scene, goals)
-    for i, each in enumerate(goals):
-        one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
-        e, blocks = together.only(np.arange(5) == i).blocks(
-            each[None], np.broadcast_to(np.eye(6), (1, len(each), 6, 6))
-        )
-        e_one, blocks_one = one.blocks(each, np.broadcast_to(np.eye(6), (len(each), 6, 6)))
-        J = together.gathered(blocks)[0].T
-        J_one = one.gathered(blocks_one).T
-        assert_allclose(J.T @ J, J_one.T @ J_one, rtol=0, atol=1e-12)
-        assert_allclose(J.T @ e[0], J_one.T @ e_one, rtol=0, atol=1e-12)
-
-
-def test_more_than_fit_into_a_chunk() -> None:
-    seen = draws(scenes.bridge(), 2 * BATCH + 3)
-    many = correct_many(seen, contact)
-    assert len(many) == len(seen)
-    corrector = ContactCorrector()
-    for i in (0, BATCH - 1, BATCH, 2 * BATCH - 1, 2 * BATCH, 2 * BATCH + 2):
-        assert_allclose(many[i].poses, corrector(seen[i]).poses, rtol=0, atol=1e-9)
-
-
-def test_the_same_with_walls() -> None:
-    scene = scenes.stick_on_castles()
-    assembly = walled(scene, "stick_on_castles", Gap("clearance", -0.5e-3, 0.5e-3))
-    seen = [replace(one, assembly=assembly) for one in draws(scene, 6)]
-    corrector = ContactCorrector()
-    many = correct_many(seen, contact)
-    assert all(made.ok for made in many)
-    check_same(many, [corrector(one) for one in seen])
-
-
-@pytest.mark.parametrize("doubt", ["warn", "drop"])
-def test_the_same_with_wrong_relations(doubt: str) -> None:
-    scene = scenes.stick_on_castles()
-    assembly = shifted(scene.assembly, {"stick.py on castle1.spy": 10.0})
-    seen = [replace(one, assembly=assembly) for one in draws(scene, 4)]
-    corrector = ContactCorrector(doubt)  # type: ignore[arg-type]
-    many = correct_many(seen, corrector)
-    single = [corrector(one) for one in seen]
-    assert [made.status for made in many] == [made.status for made in single]
-    assert [made.dropped for made in many] == [made.dropped for made in single]
-    assert {made.status for made in many} == {"converged" if doubt == "drop" else "inconsistent"}
-    for a, b in zip(many, single, strict=True):
-        if a.ok:
-            assert_allclose(a.poses, b.poses, rtol=0, atol=1e-9)
-
-
-def test_one_that_was_not_seen_is_refused_alone() -> None:
-    seen = draws(scenes.stick_in_tower(), 3)
-    seen[1] = replace(seen[1], observed=np.array([True, False, True]))
-    many = correct_many(seen, contact)
-    assert [made.status for made in many] == ["converged", "not_seen", "converged"]
-    assert_allclose(many[1].poses, seen[1].poses, rtol=0, atol=0)
-
-
-def test_none_at_all() -> None:
-    assert correct_many([]) == ()
-    assert correct_many(()) == ()
 
 
 def test_other_assemblies_are_refused() -> None:

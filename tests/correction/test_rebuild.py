@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario, replay
+from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.simulation.execution import ExecutionConfig
@@ -75,13 +75,3 @@ def test_a_group_is_taken_down_as_a_group_and_all_of_it_undone() -> None:
     for part, T in layout.start.items():
         assert np.linalg.norm(final.poses[part][:3, 3] - T[:3, 3]) < 0.002
     assert all(snapshot is None for snapshot in tried.result.reached.after)
-
-
-def test_a_collision_names_what_was_struck() -> None:
-    """Block A is believed to be where it is not: the fingers come down on it."""
-    scene = scene_of("block_on_block")
-    layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
-    there = {**layout.start, "A": layout.start["B"] @ pose.at((0.06, 0.0, 0.0))}
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene, parts_at=there)
-    assert (result.outcome.stage, result.outcome.code) == ("pick", "collision")
-    assert result.outcome.sentence == "the arm struck A in operation 1"

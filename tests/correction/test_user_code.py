@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, observe
-from apo_bench.assembly import Contact, PartFace
 from apo_bench.cli.app import main
-from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.errors import failed
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.wrong_contacts import with_contacts
 from tests import scenes
@@ -97,37 +93,6 @@ def test_a_card_and_a_replay_of_noise_that_raises(name: str, capsys: pytest.Capt
     refused([*trial, "--noise", f"users_code:{name}"], RAISED[name], capsys)
 
 
-def test_a_sweep_of_noise_that_raises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cells = [
-        "--noise-level",
-        "1",
-        "--human-error-scale",
-        "0",
-        "--method",
-        "uncorrected",
-        "--trials",
-        "1",
-        "--grasp",
-        "weld",
-    ]
-    work = ["--workers", "1", "--out", str(tmp_path / "run")]
-    refused(["sweep", "stick_in_tower", *cells, *work, "--noise", "users_code:name"], RAISED["name"], capsys)
-
-
-def test_an_environment_whose_noise_raises() -> None:
-    with pytest.raises(InputError, match=r"'Init' failed: it raised RuntimeError|'users_code:Init' failed"):
-        APOReplay(noise="users_code:Init")
-    env = APOReplay(noise="users_code:name", human_error_scale=0.0, grasp="weld")
-    with pytest.raises(InputError, match="the noise model 'name' failed: it raised NameError"):
-        env.reset(seed=0)
-
-
-def test_relations_that_raise(capsys: pytest.CaptureFixture[str]) -> None:
-    trial = ["run", "stick_in_tower", "--human-error-scale", "0", "--grasp", "weld", "--method", "contact"]
-    words = "the source of contacts 'relations' failed: told nothing; correct it, or use another."
-    refused([*trial, "--contact-source", "users_code:relations"], words, capsys)
-
-
 def _raising(error: Exception) -> Any:
     def users(*given: Any) -> Any:
         raise error
@@ -163,27 +128,3 @@ def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)
         assert isinstance(error, InputError) or raised.value.__cause__ is error
-
-
-def test_a_sentence_about_what_failed() -> None:
-    said = "the noise model 'mine' failed: it raised RuntimeError('oops'); correct it, or use another."
-    assert str(failed("the noise model 'mine'", RuntimeError("oops"))) == said
-
-
-def test_relations_name_faces_that_there_are() -> None:
-    def invents(assembly: Any, *_: Any) -> Any:
-        first, *others = assembly.operations
-        made = Contact(first.contacts[0].manipulated, PartFace("table", "cellar"))
-        return replace(assembly, operations=(replace(first, contacts=(made,)), *others))
-
-    with pytest.raises(InputError, match=r"'invents' returned a contact of table\.cellar, which is no face"):
-        with_contacts(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
-
-
-@pytest.mark.parametrize("given", ["users_code:nope", "users_code:Pathh", "users_code:annotation", "users_code:maths"])
-def test_only_what_a_module_makes_itself_is_suggested(given: str) -> None:
-    with pytest.raises(InputError) as raised:
-        make_noise(given, NOISE_LEVEL)
-    said = str(raised.value)
-    assert said.endswith("Known: Init, Slow, imports, mine, name, plain, relations.")
-    assert all(f"'{other}'" not in said for other in ("np", "Path", "annotations", "math"))

@@ -186,9 +186,9 @@ def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
     with pytest.raises(InputError, match="seven numbers"):
         env.step("forward")  # type: ignore[arg-type]
     for trial in (3.5, "3", True, float("nan"), [1], -1):
-        with pytest.raises(InputError, match="whole numbers from 0"):
+        with pytest.raises(InputError, match="must be a whole number from 0"):
             env.reset(options={"trial": trial})
-        with pytest.raises(InputError, match="whole numbers from 0"):
+        with pytest.raises(InputError, match="must be a whole number from 0"):
             env.reset(seed=trial)  # type: ignore[arg-type]
     env.reset(options={"lerobot_new_rollout": True, **TRIAL})
 

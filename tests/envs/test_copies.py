@@ -158,7 +158,7 @@ def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> 
         ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'noise_level'. Known: clearance_mm, human"),
         ([("noise_level", 1)], "a dict with trial, noise_level, human_error_scale, clearance_mm is"),
         ({"noise_level": None}, "the noise level None was given"),
-        ({"noise_level": 2, "human_error_scale": 11}, "human error scale of 11"),
+        ({"noise_level": 2, "human_error_scale": 11}, "human error scale must be a number from 0 to 10, got 11"),
         ({"noise_level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
     ],
 )

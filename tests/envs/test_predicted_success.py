@@ -38,7 +38,7 @@ def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypa
 
 
 def test_a_probability_is_needed() -> None:
-    with pytest.raises(InputError, match=r"a minimum predicted success of 1\.5 was given; a number from 0 to 1"):
+    with pytest.raises(InputError, match=r"min predicted success must be a number from 0 to 1, got 1\.5"):
         APOReplay(SCENARIO, min_predicted_success=1.5)
     with pytest.raises(InputError, match="min_predicted_success of APOReplay must be a number, got True"):
         APOReplay(SCENARIO, min_predicted_success=True)

@@ -29,11 +29,3 @@ def test_a_cube_falls_until_its_lowest_corner_touches(height: float, turn: tuple
 def test_what_is_beside_or_below_is_passed_by(at: tuple[float, float, float]) -> None:
     """Also a wall along which the cube slides down."""
     assert drop(CUBE, pose.at(at), SLAB, np.eye(4)) == np.inf
-
-
-def test_a_castle_stands_in_the_shadow_of_another_one_and_falls_past_it() -> None:
-    """Boxes around both lie over one another, the cubes do not."""
-    T = pose.at((0.0, 0.0, 0.1), (0, 0, 45))
-    other = pose.at((0.035, 0.035, 0.0), (0, 0, 45))
-    assert drop(CUBE, T, CUBE, other) == np.inf
-    assert drop(CUBE, T, CUBE, pose.at((0.025, 0.025, 0.0), (0, 0, 45))) == pytest.approx(0.06, abs=3 * TOUCH_M)

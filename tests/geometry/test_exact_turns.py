@@ -7,12 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
-from apo_bench.perception.observation.models.facts import NoiseLevel
-from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
-from apo_bench.trial.pose_error import goal_errors
-from tests import scenes
-from tests.correction.robust.test_robust import shown
-from tests.round_contacts import CONTACTS, MM, part, pin, plate, ring, scene, tube, wall
+from tests.round_contacts import MM, part, pin, plate, ring, tube, wall
 
 
 def prism(corners: np.ndarray, height: float, at: np.ndarray | None = None, fit: tuple[str, ...] = ()) -> Solid:
@@ -61,22 +56,6 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
             assert apart.min(axis=1).max() < 1e-9
 
 
-def test_marks_of_fit_break_a_symmetry():
-    whole = prism(regular(4), 10 * MM)
-    assert len(symmetries(prism(regular(4), 10 * MM, fit=("side0",)))) == 2
-    assert len(symmetries(prism(regular(4), 10 * MM, fit=("top", "bottom")))) == len(symmetries(whole))
-
-
-def test_boxes_as_hulls_have_the_symmetries_of_boxes():
-    """A plate with a slot, of three boxes: the same turns as those of its grid of cells."""
-    block = scenes.block()
-    hulls = tuple(Hull(box.name, box.corners) for box in block.pieces)
-    found = symmetries(replace(block, pieces=hulls))
-    assert len(found) == len(symmetries(block))
-    for g in found:
-        assert min(np.abs(g - known).max() for known in symmetries(block)) < 1e-9
-
-
 @pytest.mark.parametrize("sides", [None, 16])
 def test_a_bush_is_the_same_after_any_turn_and_upside_down(sides):
     found = revolution(bush(sides=sides))
@@ -118,42 +97,3 @@ def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
     best = max(np.trace(expected[:3, :3].T @ one[:3, :3]) for one in every)
     assert np.trace(expected[:3, :3].T @ found[:3, :3]) >= best - 1e-9
     assert min(np.abs(found - one).max() for one in every) < 0.01
-
-
-def pinned():
-    given, at, _ = CONTACTS["shaft in hole"]
-    assembly, start, truth = scene(given, at=at)
-    demonstration = shown("block_on_block")[2]
-    error = np.zeros((2, 6, 6))
-    return assembly, replace(
-        demonstration, assembly=assembly, start=start, poses=truth, final=start, human_error_covariance=error
-    )
-
-
-def test_noise_turns_a_part_of_revolution_about_its_axis_as_it_states():
-    assembly, demonstration = pinned()
-    turned = []
-    stated = []
-    for seed in range(200):
-        seen = Symmetric(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(seen.poses) @ demonstration.poses)
-        turned.append(xi[1, 3:])
-        stated.append(np.diag(seen.covariance[1])[3:])
-    assert np.degrees(np.std(turned, axis=0)) == pytest.approx([1.0, 1.0, 3.0], rel=0.15)
-    assert np.sqrt(np.mean(stated, axis=0)) == pytest.approx(np.std(turned, axis=0), rel=0.15)
-    any_turn = AnyTurn(NoiseLevel(1.0, 1.0))(assembly, demonstration, np.random.default_rng(0))
-    off = pose.inverse(any_turn.poses[1]) @ demonstration.poses[1]
-    assert abs(np.arctan2(off[1, 0], off[0, 0])) > 0.1
-
-
-def test_a_free_turn_of_a_part_of_revolution_is_no_error():
-    assembly, demonstration = pinned()
-    truth = demonstration.poses
-    found = revolution(assembly.solids["pin"])
-    goals = np.array(truth)
-    goals[1] = goals[1] @ turn_about(found.point, found.axis, 2.5)
-    assert goal_errors(assembly, demonstration.start, truth, goals) == pytest.approx((0.0, 0.0), abs=1e-9)
-    goals[1] = goals[1] @ pose.exp(np.array([0.0, 0.0, 3 * MM, 0, 0, 0]))
-    fixed, free = goal_errors(assembly, demonstration.start, truth, goals)
-    assert fixed == pytest.approx(0.0, abs=1e-9)
-    assert free == pytest.approx(3.0 / np.sqrt(2))

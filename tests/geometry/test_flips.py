@@ -32,11 +32,6 @@ def test_a_long_box_is_turned_by_halves_only() -> None:
     assert_allclose(np.trace(flips.turns[:, :3, :3], axis1=1, axis2=2), -1.0, atol=1e-12)
 
 
-def test_a_part_without_any_like_sides_has_none() -> None:
-    corner = scenes.solid("corner", [], ((0, 0, 0), (20, 10, 5)), ((15, 25, 0), (5, 15, 5)))
-    assert approximate_symmetries(corner, 0.95).turns.shape == (0, 4, 4)
-
-
 @pytest.mark.parametrize("name", ["vanished_fixture", "nested_bushings"])
 def test_turns_are_about_the_centre_of_volume_and_known_symmetries_are_marked(name: str) -> None:
     for solid in load_scenario(name).assembly.solids.values():
@@ -46,8 +41,3 @@ def test_turns_are_about_the_centre_of_volume_and_known_symmetries_are_marked(na
             assert_allclose(pose.apply(F, solid.centroid[None])[0], solid.centroid, atol=1e-12)
             assert exact == (np.abs(symmetries(solid) - F).max(axis=(1, 2)) < 1e-6).any()
             assert np.abs(F - np.eye(4)).max() > 0.5
-
-
-def test_of_a_part_of_revolution_one_turn_end_over_end_is_left() -> None:
-    spindle = load_scenario("nested_bushings").assembly.solids["spindle"]
-    assert len(approximate_symmetries(spindle).turns) == 1

@@ -23,7 +23,6 @@ from apo_bench.geometry import (
     separating_axes,
     sides_of,
 )
-from apo_bench.geometry.penetration import intrusion
 from tests.geometry.overlaps import overlap_intervals
 
 
@@ -95,16 +94,6 @@ def test_a_hole_that_fits_gets_wider_by_the_clearance():
     assert outer == pytest.approx(np.full(70, 0.02), abs=1e-9)
     plain = solid(*wedges(0.005, 70), bore=bore(0.005, fit=False))
     assert physical_pieces(plain, 1e-3 * clearance_mm) is plain.pieces
-
-
-@pytest.mark.parametrize("off_mm", [0.1, 0.5])
-def test_a_shaft_beside_the_middle_of_its_hole_is_as_deep_as_it_is_off(off_mm: float):
-    plate = solid(*physical_pieces(solid(*wedges(0.005, 70), bore=bore(0.005, True)), 0.25e-3))
-    shaft = solid(cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.03)))
-    T = np.eye(4)
-    T[:2, 3] = 1e-3 * off_mm * np.array([np.cos(0.4), np.sin(0.4)])
-    deep = intrusion(shaft, T, plate, np.eye(4))
-    assert deep == pytest.approx(max(0.0, 1e-3 * (off_mm - 0.25)), abs=2 * SAGITTA_M)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -27,9 +27,3 @@ def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array)
     depth = intrusion(a, np.eye(4), b, T)
     assert intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
     assert intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)
-
-
-@pytest.mark.parametrize(("apart_mm", "depth_mm"), [(19.0, 1.0), (20.0, 0.0), (21.0, 0.0)])
-def test_the_depth_of_two_aligned_blocks(apart_mm: float, depth_mm: float):
-    a = block(0.05, 0.05, 0.01)
-    assert 1e3 * intrusion(a, np.eye(4), a, pose.at((0, 0, 1e-3 * apart_mm))) == pytest.approx(depth_mm, abs=1e-9)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Array, Face, beside, face_area, pose
-from apo_bench.geometry.covering import NO_OVERLAP, overlap
+from apo_bench.geometry import Array, Face, face_area, pose
+from apo_bench.geometry.covering import overlap
 
 pytestmark = pytest.mark.numeric
 
@@ -40,30 +40,6 @@ poses = st.builds(lambda p, a: pose.at(p, a), st.tuples(lengths, lengths, length
 flat_poses = st.builds(lambda x, y, a: pose.at((x, y, 0), (0, 0, a)), lengths, lengths, turns)
 
 
-def test_a_small_face_on_a_large_one_keeps_its_own_corners():
-    found = overlap(rectangle(0.03, 0.02), OVER, rectangle(0.1, 0.1), EYE)
-    assert found.area == pytest.approx(24e-4, abs=1e-15)
-    assert {tuple(c) for c in found.corners.round(12)} == {(x, y, 0.0) for x in (-0.03, 0.03) for y in (-0.02, 0.02)}
-
-
-def test_a_share_is_what_is_covered_of_the_other_overlap():
-    """A quarter of the wide one lies under the narrow one, which is covered whole."""
-    table = rectangle(0.1, 0.1)
-    wide, narrow = (overlap(rectangle(x, 0.02), OVER, table, EYE) for x in (0.04, 0.01))
-    beside = overlap(rectangle(0.01, 0.02), pose.at((0.08, 0, 0)) @ OVER, table, EYE)
-    assert narrow.share(wide) == pytest.approx(0.25)
-    assert wide.share(narrow) == pytest.approx(1.0)
-    assert beside.share(wide) == 0.0
-    assert NO_OVERLAP.share(wide) == 0.0
-    assert wide.share(NO_OVERLAP) == 1.0
-
-
-def test_a_hole_is_no_overlap_and_its_corners_count():
-    found = overlap(rectangle(0.02, 0.02), OVER, ring(0.025, 0.01), EYE)
-    assert found.area == pytest.approx(0.04**2 - 0.02**2)
-    assert len(found.corners) == 8
-
-
 @pytest.mark.parametrize(
     ("T", "why"),
     [
@@ -92,15 +68,6 @@ def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face:
         assert gaps.max() < 1e-7
 
 
-@given(flat_poses)
-@settings(max_examples=30, deadline=None)
-def test_faces_in_one_plane_overlap_each_other_equally(T_face: Array):
-    there = overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE)
-    back = overlap(ring(0.04, 0.012), EYE, U_SHAPE, T_face @ OVER)
-    assert back.area == pytest.approx(there.area, abs=1e-12)
-    assert there.area <= min(face_area(U_SHAPE), face_area(ring(0.04, 0.012))) + 1e-12
-
-
 @given(st.floats(-80, 80), st.floats(-80, 80))
 @settings(max_examples=30, deadline=None)
 def test_the_shadow_of_a_tilted_face_shrinks_with_the_cosine(rx: float, ry: float):
@@ -122,9 +89,3 @@ def test_the_area_is_that_of_counted_points(T_face: Array):
     in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
     counted = step**2 * np.count_nonzero(in_ring & in_u)
     assert overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)
-
-
-def test_a_face_lies_beside_another_by_their_distance_in_its_plane_at_any_height() -> None:
-    square = rectangle(0.01, 0.01)
-    assert beside(square, OVER @ pose.at((0.015, 0.0, 0.3), (0.0, 0.0, 0.0)), square, EYE) == 0.0
-    assert np.isclose(beside(square, pose.at((0.05, 0.0, 0.3), (0.0, 0.0, 0.0)) @ OVER, square, EYE), 0.03)

@@ -85,22 +85,3 @@ def test_the_end_of_the_overlap_is_the_same_for_all_kinds_of_pieces() -> None:
         assert exit_distance(hulls[:1], way, hulls[1:]) == pytest.approx(wanted, abs=1e-9)
         assert exit_distance([moving], way, [near[0], hulls[2]]) == pytest.approx(wanted, abs=1e-9)
     assert left > 20
-
-
-def test_of_many_pieces_a_way_is_free_where_all_places_on_it_are() -> None:
-    rng = np.random.default_rng(4)
-    clouds = [
-        Posed(tuple(Hull("", rng.normal(size=(6, 3)) * 0.004 + rng.uniform(-0.03, 0.03, 3)) for _ in range(20)), T)
-        for T in (np.eye(4), pose.at((0.05, 0.0, 0.02)))
-    ]
-    looks = np.arange(0.0, 0.04, 1e-4)
-    found = set()
-    for way in np.concatenate([np.eye(3), -np.eye(3), [[0.6, 0.0, 0.8], [0.0, -0.6, 0.8]]]):
-        at = clouds[0].T[:3, 3] + np.outer(looks, way)
-        deepest = intrusion_depths(clouds[0].pieces, np.eye(3), at, clouds[1].pieces, clouds[1].T).max()
-        free = is_way_free(clouds[:1], way, 0.04, clouds[1:])
-        assert free == (deepest < 5e-5)
-        found.add(free)
-        spans = overlap_intervals(clouds[0], way, clouds[1], within=(0.0, 0.04))
-        assert bool(len(spans) and ((spans[:, 1] > 0.0) & (spans[:, 0] < 0.04)).any()) != free
-    assert found == {True, False}

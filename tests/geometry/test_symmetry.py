@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench.geometry import Array, Box, Solid, folds, pose, quarter_turns, symmetries
-from apo_bench.geometry.symmetry import nearest_symmetry
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -72,16 +71,3 @@ def test_known_parts(part: Solid, order: int, fold: tuple[int, ...]) -> None:
     assert len(found) == order
     assert tuple(folds(found)) == fold
     assert_allclose(found[0], np.eye(4))
-
-
-def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
-    """Of a stick: 45 degrees about its axis; every rotation is within 90 degrees of one of the eight."""
-    group = symmetries(scenes.stick())
-    rng = np.random.default_rng(2)
-    w = rng.standard_normal((500, 3)) * 2.0
-    off = pose.exp(np.concatenate([np.zeros((500, 3)), w], axis=1))
-    left = np.degrees(np.linalg.norm(pose.log(off @ nearest_symmetry(group, off))[:, 3:], axis=1))
-    every = [np.degrees(np.linalg.norm(pose.log(off @ g)[:, 3:], axis=1)) for g in group]
-    assert_allclose(left, np.min(every, axis=0), atol=1e-6)
-    roll = pose.exp(np.array([[0.0, 0.0, 0.0, angle, 0.0, 0.0] for angle in np.radians(np.arange(0.0, 360.0, 7.0))]))
-    assert np.degrees(np.abs(pose.log(roll @ nearest_symmetry(group, roll))[:, 3])).max() <= 45.0 + 1e-9

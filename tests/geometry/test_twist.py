@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
-from apo_bench.geometry import GENERATORS, Array, exp_and_jacobian, pose, right_jacobian
+from apo_bench.geometry import Array, exp_and_jacobian, pose, right_jacobian
 
 pytestmark = pytest.mark.numeric
 
@@ -52,15 +52,3 @@ def test_the_jacobian_is_its_power_series(seed: int, angle: float) -> None:
         series = series + power / factorial(k + 1)
         power = power @ minus
     assert_allclose(right_jacobian(xi), series, rtol=0, atol=1e-12)
-
-
-def test_no_twist_is_exactly_nothing() -> None:
-    T, J = exp_and_jacobian(np.zeros((3, 6)))
-    assert_array_equal(T, np.tile(np.eye(4), (3, 1, 1)))
-    assert_array_equal(J, np.tile(np.eye(6), (3, 1, 1)))
-
-
-def test_generators_are_the_derivatives_of_the_exponential() -> None:
-    by = 1e-6
-    numeric = [(pose.exp(by * unit) - pose.exp(-by * unit)) / (2 * by) for unit in np.eye(6)]
-    assert_allclose(GENERATORS, numeric, rtol=0, atol=1e-9)

@@ -71,31 +71,3 @@ def test_a_part_of_revolution_is_the_same_after_any_turn_about_its_axis(name: st
         x, y, turn = rng.uniform([-100, -100, -40], [100, 100, 40])
         found = verdict(scene, [*edits, moved(1, scenes.mm(x, y, 0, (0, 0, turn)))])
         assert (found.success, found.finished.why) == (True, "")
-
-
-@pytest.mark.parametrize(
-    ("name", "edits", "code", "words"),
-    [
-        (
-            "peg_in_plate",
-            [shift("peg", 2, 0.4, 0, 0)],
-            "gap",
-            "peg.wall on plate.bore is 0.40 mm off the axis, where 0.35 mm are allowed",
-        ),
-        (
-            "countersink",
-            [shift("plug", 2, 0, 0, 1)],
-            "gap",
-            "plug.cone on plate.sink is 0.71 mm off its seat, where 0.1 mm are allowed",
-        ),
-        (
-            "on_rim",
-            [shift("plug", 2, 0, 0, 0, (8, 0, 0))],
-            "gap",
-            "plug.cone on plate.rim is turned by 8.0 deg, where 5 deg are allowed",
-        ),
-    ],
-)
-def test_words_of_faults_of_round_contacts(name: str, edits: list[Edit], code: str, words: str) -> None:
-    found = verdict(rounds.ALL[name](), edits).finished
-    assert (found.code, found.why) == (code, words)

@@ -16,7 +16,7 @@ from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
-from apo_bench.cli.setting_options import sweep_options, trial_options
+from apo_bench.cli.shared.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import (
     KEY,
@@ -81,8 +81,8 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
         ({"grasp": "weld", "method": "oracle+probe"}, "the grasp 'weld' was given for a method with +probe"),
         ({"contact_source": 1}, "an int was given as contact source;"),
-        ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
-        ({"clearance_mm": float("inf")}, "a clearance of inf was given; a number from 0 to 5 is allowed"),
+        ({"seed": 1.5}, "seed must be a whole number from 0 to"),
+        ({"clearance_mm": float("inf")}, "clearance mm must be a number from 0 to 5, got inf"),
     ],
 )
 def test_a_setting_that_cannot_be_is_one_sentence(wrong: dict[str, object], said: str) -> None:
@@ -121,4 +121,4 @@ def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.M
     for name in SETTINGS:
         assert f"| `{name}` | " in pages.settings_page()
     for column in RECORD_FIELDS:
-        assert f"| `{column}` | " in pages.row_page()
+        assert f"| `{column}` | " in pages.record_page()

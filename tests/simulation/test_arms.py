@@ -8,17 +8,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench import Arm, InputError, TrialConfig, build_scene, load_scenario, read_arm, run_trial
+from apo_bench import Arm, InputError, TrialConfig, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.records.own_code import own_code
 from apo_bench.resources import folder
 from apo_bench.simulation.arm_checks.arm_check import check_arm
+from apo_bench.simulation.arms import finding
 from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.simulation.arms.gripper_file import read_gripper
 from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import smooth_trajectory
-from apo_bench.simulation.robot.reach import along, follow_waypoints, limit_speed, plan_waypoints
-from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints
 from apo_bench.viz.arm_text import check_lines
 
 ARMS = folder("assets") / "arms"
@@ -68,37 +68,6 @@ def test_the_primitive_arms_have_the_published_kinematics() -> None:
     np.testing.assert_allclose(flange("panda_primitive", q), expected @ by(z=0.107), atol=1e-8)
 
 
-@pytest.fixture(scope="module")
-def six_axis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Today's arm, as a stranger would describe it."""
-    path = tmp_path_factory.mktemp("arm") / "mine.toml"
-    lines = ('schema = "apo-bench/arm/1"', f'mjcf = "{ARMS / "six_axis.xml"}"', 'flange = "gripper"')
-    path.write_text("\n".join((*lines, "home_deg = [0, 11.46, 51.57, 0, 26.93, 0]", "base = {at_mm = [-420, 0, 0]}")))
-    return path
-
-
-def test_what_is_measured_of_a_known_gripper_is_what_its_file_says(six_axis_file: Path) -> None:
-    """Slides of 47 mm and 40 N shared by two pads; its own drives are stiff, and kept.
-
-    Fingers at rest stand up to 20 um beside each other, and so does the middle between them.
-    """
-    arm = find_arm(str(six_axis_file))
-    assert arm.files[0] == six_axis_file
-    known = find_arm("six_axis")
-    assert arm.hand is not None
-    assert arm.control == "own position actuators"
-    assert arm.joints == known.joints
-    assert arm.mount == known.mount
-    assert arm.opening_m == pytest.approx(0.047, abs=2e-4)
-    assert arm.hand.force_n == pytest.approx(20.0, rel=0.03)
-    assert arm.hand.friction == 1.2
-    q = np.radians([10, 20, 50, 5, 30, 40])
-    mine = Kinematics(arm).forward(q)
-    theirs = Kinematics(known).forward(q)
-    np.testing.assert_allclose(mine[:3, 3], theirs[:3, 3], atol=4e-5)
-    np.testing.assert_allclose(np.abs(mine[:3, :3]), np.abs(theirs[:3, :3]), atol=1e-5)
-
-
 def test_a_linkage_opens_as_its_geometry_says() -> None:
     """Half of 85 mm: 30.6 + 57.1 sin(41.2 degrees - q) - 25.4 mm; the command is the angle of its drivers."""
     hand = find_arm("ur5e_primitive").hand
@@ -128,25 +97,6 @@ def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) 
     np.testing.assert_allclose(q, arm.home, atol=1e-3)
 
 
-def test_a_line_takes_as_long_as_the_joints_need() -> None:
-    arm = find_arm("ur5e_primitive")
-    kinematics = Kinematics(arm)
-    q = np.array(arm.home)
-    end = kinematics.forward(q)
-    end[:3, 3] += (0.1, 0.2, -0.1)
-    line = smooth_trajectory(kinematics.forward(q), end, 5.0)
-    most = np.full(6, 0.5)
-    slower, knots = limit_speed(kinematics, line, q, most)
-    t = np.linspace(0.0, 1.0, 201)
-    path = along(kinematics, slower, slower.progress(t), q)
-    assert path is not None
-    fastest = np.abs(np.gradient(path, slower.seconds / 200, axis=0)).max()
-    assert fastest == pytest.approx(0.5, rel=0.02)
-    assert limit_speed(kinematics, line, q, np.full(6, 50.0))[0] is line
-    shared = along(kinematics, slower, slower.progress(t), q, knots)
-    assert np.array_equal(shared, path), "what was solved for the speed is what would be solved again"
-
-
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: str) -> None:
     row = run_trial(TrialConfig("block_on_block", method="oracle", fidelity="near-contact", arm=name))
@@ -156,19 +106,24 @@ def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: st
 
 GOOD = 'schema = "apo-bench/arm/1"\nmjcf = "ARMS/ur5e_primitive.xml"\n'
 HOME = "base = { at_mm = [-480, 0, 0] }\nhome_deg = [18, -79, -105, -86, 90, -72]\n"
-GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
+GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\nhand = "linkage_gripper"\n'
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         (GOOD + "joint = 1", r"unknown key 'joint' \(did you mean 'joints'"),
-        (GOOD + "[gripper]\nspeed_mm_s = 0", "gripper, speed_mm_s: a number > 0"),
-        (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
-        ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "the model file of the arm is missing"),
+        (GOOD + GRIPPER + "speed_mm_s = 0", "gripper, speed_mm_s: a number > 0"),
+        (
+            GOOD + '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"',
+            "what the gripper does is not stated; name its gripper file",
+        ),
+        (GOOD + GRIPPER.replace('"linkage_gripper"', '"linkage"'), "unknown gripper 'linkage'; known are franka_hand"),
+        (GOOD + GRIPPER.replace('"linkage_gripper"', '"franka_hand"'), "unknown body 'gripper/hand'"),
+        ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"\n' + GRIPPER, "the model file of the arm is missing"),
         (GOOD + 'flange = "flnge"\n' + GRIPPER, "unknown flange 'flnge'; did you mean 'flange'"),
         (GOOD + "home_deg = [1, 2]\n" + GRIPPER, "'home_deg' has 2 numbers; the arm has 6 joints"),
-        (GOOD, "the gripper has no joint"),
+        (GOOD, "the key 'gripper' is missing"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
@@ -201,6 +156,7 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
     (robots / "ur5e" / "robot.xml").write_text(arm)
     (grippers / "robotiq_gripper_85.xml").write_text((ARMS / "linkage_gripper.xml").read_text())
     monkeypatch.setenv("APO_BENCH_ROBOSUITE", str(tmp_path))
+    monkeypatch.setattr(finding, "_GRIPPERS", {"ur5e": ("robotiq_gripper_85", "linkage_gripper")})
     monkeypatch.setenv("APO_BENCH_MENAGERIE", str(tmp_path / "none"))
     assert find_arm("robosuite:UR5e").opening_m == pytest.approx(0.0428, abs=2e-4)
     assert (
@@ -210,31 +166,6 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
         find_arm("robosuite:UR9")
     with pytest.raises(InputError, match="fetch it with 'git clone"):
         find_arm("menagerie:universal_robots_ur5e")
-
-
-@pytest.mark.parametrize(("said", "force_n", "times"), [("", 20.0, 20.0 / 3.5), ("force_n = 14", 14.0, 4.0)])
-def test_a_gripper_that_hardly_pushes_is_made_stronger_and_this_is_said(
-    tmp_path: Path, said: str, force_n: float, times: float
-) -> None:
-    """The parallel gripper with a tenth of its strength: 70 N shared by two pads."""
-    weak = (ARMS / "parallel_gripper.xml").read_text().replace('kp="4000"', 'kp="400"').replace("-70 70", "-7 7")
-    (tmp_path / "weak.xml").write_text(weak)
-    arm = read_arm(described(tmp_path, said))
-    assert arm.hand is not None
-    assert arm.hand.force_n == pytest.approx(force_n, rel=0.02)
-    match = re.search("made from the model, gripper drive (.*) times as strong as in the model", arm.control)
-    assert match is not None
-    assert float(match[1]) == pytest.approx(times, rel=0.04)
-
-
-def test_a_gripper_of_which_one_jaw_moves_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "weak.xml").write_text(
-        """<mujoco><worldbody><body><geom type="box" pos="-0.02 0 0.06" size="0.004 0.01 0.04"/><body pos="0.02 0 0">
-        <joint name="jaw" axis="0 1 0" range="0 40"/><geom type="box" pos="0 0 0.06" size="0.004 0.01 0.04"/></body>
-        </body></worldbody><actuator><position joint="jaw" kp="30" ctrlrange="0 0.7"/></actuator></mujoco>"""
-    )
-    with pytest.raises(InputError, match=r"one jaw of the gripper moves \('gripper/jaw'\) and the other is fixed"):
-        read_arm(described(tmp_path, ""))
 
 
 def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> None:
@@ -253,17 +184,6 @@ def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> N
     assert len(plan_waypoints(kinematics, arm, ends[0], near, q)) == 1
     usual = find_arm("six_axis")
     assert len(plan_waypoints(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
-
-
-def test_an_arm_waits_with_no_joint_wound_up() -> None:
-    """A Panda's tip may wait at any of four turns: the usual posture, elbow up, is among those."""
-    arm = replace(find_arm("panda_primitive"), base=(-0.48, 0.0, 0.0))
-    q = with_home(arm, base_is_stated=True).home
-    kinematics = Kinematics(arm)
-    low, high = kinematics.range_of_joints
-    assert (np.minimum(q - low, high - q) > np.radians(15.0)).all()
-    assert (np.abs(q) <= np.pi).all()
-    assert kinematics.forward(q)[2, 2] == pytest.approx(-1.0, abs=1e-4)
 
 
 def test_an_arm_that_is_short_stands_nearer_unless_its_base_is_stated() -> None:
@@ -306,13 +226,6 @@ def test_an_arm_of_five_joints_looks_down_and_leans_where_it_cannot(tmp_path: Pa
             np.testing.assert_allclose(kinematics.forward(q)[:3, 3], T[:3, 3], atol=2e-6)
 
 
-def described(folder: Path, said: str) -> Path:
-    """The arm of a UR5e with the gripper `weak.xml`, and what is said of it."""
-    path = folder / "arm.toml"
-    path.write_text(f'{GOOD.replace("ARMS", str(ARMS))}{HOME}[gripper]\nmjcf = "weak.xml"\n{said}\n')
-    return path
-
-
 STATED = """schema = "apo-bench/arm/1"
 mjcf = "MODEL"
 flange = "gripper"
@@ -348,24 +261,13 @@ def test_the_usual_arm_is_what_its_file_states() -> None:
     assert [path.name for path in arm.files] == ["six_axis.toml", "six_axis.xml"]
 
 
-def test_the_base_of_a_stated_arm_may_be_turned(tmp_path: Path) -> None:
-    turned = read_arm(stated(tmp_path, ("[-420, 0, 0] }", "[0, 420, 0], turn_deg = [0, 0, -90] }")))
-    scene = build_scene(load_scenario("block_on_block"), arm=turned)
-    there = scene.kinematics.forward(turned.home)
-    usual = Kinematics(read_arm(stated(tmp_path))).forward(turned.home)
-    x, y, z = usual[:3, 3]
-    np.testing.assert_allclose(there[:3, 3], [y, -x, z], atol=1e-12)
-    robot = Robot(scene, scene.scenario.start)
-    np.testing.assert_allclose(robot.data.site("arm/tip").xpos, there[:3, 3], atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ([("opening_mm = 46\n", "")], "'tip', 'slides', 'opening_mm' and 'actuators' are given together"),
         (
-            [("opening_mm = 46", "opening_mm = 46\nforce_n = 20")],
-            "'slides' are stated is not measured; leave 'force_n' out",
+            [("opening_mm = 46", "opening_mm = 46\nhand = 'franka_hand'")],
+            "'slides' are stated is part of the arm; leave 'hand' and 'mjcf' out",
         ),
         ([('"right_finger"', '"j1"')], "unknown slide 'j1'"),
         ([("[0, 11, 52, 0, 27, 0]", "[0, 11, 52]")], "'home_deg' needs 6 numbers"),
@@ -376,3 +278,19 @@ def test_what_is_wrong_with_a_stated_gripper_is_one_sentence(
 ) -> None:
     with pytest.raises(InputError, match=re.escape(said)):
         read_arm(stated(tmp_path, *changes))
+
+
+@pytest.mark.parametrize("path", sorted((folder("assets") / "grippers").glob("*.toml")), ids=lambda path: path.stem)
+def test_a_gripper_file_opens_as_it_is_commanded(path: Path) -> None:
+    table = read_gripper(path)
+    hand = table.hand("", table.pads)
+    for opening in hand.opening[[0, len(hand.opening) // 2, -1]]:
+        assert hand.of_command(hand.command(opening)) == pytest.approx(opening, abs=2e-3)
+    assert np.linalg.det(table.tip_frame(path)[:3, :3]) == pytest.approx(1.0)
+
+
+def test_a_gripper_file_whose_rows_do_not_fit_is_refused(tmp_path: Path) -> None:
+    text = (folder("assets") / "grippers" / "parallel_gripper.toml").read_text().replace("  [-0.03],\n", "")
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(InputError, match="'commands' needs 11 rows of 1 numbers"):
+        read_gripper(tmp_path / "mine.toml")

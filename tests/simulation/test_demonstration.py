@@ -81,16 +81,6 @@ def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, hum
         assert np.abs(end_mm(of, part)[:2]).max() < LEVEL_MM, "mended unseen"
 
 
-def test_a_group_leaves_nothing_behind_for_the_next_trial():
-    """Where a hand holds a carried part is written into the shared model; the next trial must not see it."""
-    first = shown("pocket_table", 1.0, 2).demonstration
-    simulate_demonstration(scene("pocket_table"), 0.0, 5)
-    again = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
-    np.testing.assert_array_equal(first.poses, again.poses)
-    for part, T in first.final.items():
-        np.testing.assert_array_equal(T, again.final[part])
-
-
 def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytest.MonkeyPatch):
     """Two operations carry parts that touch, and the stick falls from a hand in which it hung still."""
     quick = shown("pocket_table", 1.0, 2).demonstration

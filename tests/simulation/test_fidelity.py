@@ -15,9 +15,9 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
 from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
-from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, translate
+from apo_bench.simulation.robot.paths import Trajectory, translate
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.world import SLEEP, allow_sleep, initial_state, part_pose
+from apo_bench.simulation.scene.world import initial_state, part_pose
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -58,14 +58,6 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
     shared = [row(method, fidelity, grasp=grasp, noise_level=level, cache=cache) for method, level in asked]
     alone = [row(method, fidelity, grasp=grasp, noise_level=level) for method, level in asked[:-1]]
     assert shared == [*alone, alone[0]]
-
-
-def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
-    cache = ReplayCache()
-    plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.poses)
-    first = replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache)
-    monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), config=ExecutionConfig("near-contact"), cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():
@@ -197,29 +189,3 @@ def test_no_turn_that_comes_near_anything_is_left_out():
             assert not is_near or any(begin <= i <= end for begin, end in spans)
     assert came > 500
     assert left_out > 500
-
-
-def test_nothing_is_left_out_while_something_moves():
-    its = scene()
-    data = initial_state(its.work, shown().layout.start)
-    stick = part_pose(its.work, data, "stick")
-    line = Trajectory(translate(stick, (0, 0, 1), 0.2), translate(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
-    s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
-    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
-    assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == []
-    other = next(part for part in its.work.free if part != "stick")
-    data.qvel[its.work.dof[other]] = 0.01
-    assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == [(0, 1000)]
-
-
-def test_sleep_ends_with_the_replay():
-    options = scene().work.model.opt
-    before = int(options.enableflags)
-    with allow_sleep(scene().work, True):
-        assert options.enableflags & SLEEP
-    assert options.enableflags == before
-    with pytest.raises(IndexError), allow_sleep(scene().work, True):
-        [][0]
-    assert options.enableflags == before
-    row("oracle", "near-contact")
-    assert options.enableflags == before

@@ -4,7 +4,6 @@ import numpy as np
 
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.film.caption import ABOVE_PX, BELOW_PX, Caption, add_caption
 from apo_bench.simulation.film.film import frames, operation_words, sample_moments
 from apo_bench.simulation.film.track import FilmMoment, FilmTrack, Segment
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Phase
@@ -49,17 +48,3 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     assert drawn[0].shape == drawn[-1].shape
     assert np.abs(drawn[0].astype(int) - drawn[1]).max() > 50
     assert np.array_equal(end, hands.moments[-1].qpos)
-
-
-def test_words_stand_around_the_picture() -> None:
-    picture = np.zeros((240, 480, 3), np.uint8)
-    inset = np.full((40, 60, 3), 128, np.uint8)
-    plain = add_caption(picture, inset, Caption("a", "x 2", ("done",), ""))
-    failed = add_caption(picture, inset, Caption("a", "x 2", ("done",), "", good=False))
-    assert plain.shape == (240 + ABOVE_PX + BELOW_PX, 480, 3)
-    inside = plain[ABOVE_PX:-BELOW_PX]
-    assert not inside[50:].any()
-    assert (inside[10, -10] == 128).all()
-    below = failed[-BELOW_PX:].astype(int)
-    assert (below[..., 0] - below[..., 1]).max() > 100
-    assert np.array_equal(plain[:-BELOW_PX], failed[:-BELOW_PX])

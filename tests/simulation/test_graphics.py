@@ -80,19 +80,6 @@ def test_a_scene_is_composed_under_any_backend_and_a_picture_is_drawn_or_refused
 
 
 @linux
-@pytest.mark.parametrize("first", ["mujoco", "mujoco.rendering.classic.gl_context"])
-def test_a_context_is_there_for_whoever_asks_for_one(first: str) -> None:
-    """Whichever name is asked first, it is the same class; a name that is not there is none."""
-    ask = f"from {first} import GLContext as asked\n"
-    ask += "import mujoco, mujoco.gl_context\nfrom mujoco.rendering.classic import gl_context as own\n"
-    ask += "print(asked is mujoco.GLContext is mujoco.gl_context.GLContext is own.GLContext, asked.__module__)\n"
-    done = python(f"import apo_bench.simulation\n{ask}print(hasattr(mujoco, 'GLContexts'))\n", "egl")
-    if "libEGL" in done.stderr or "NoneType" in done.stderr:
-        pytest.skip("no EGL")
-    assert (done.returncode, done.stdout) == (0, "True mujoco.egl\nFalse\n"), done.stderr
-
-
-@linux
 def test_a_window_without_a_display_is_one_sentence_and_not_the_end_of_the_process() -> None:
     code = f"MODE = 'human'\nfrom apo_bench.errors import InputError\ntry:{REPLAY.replace(chr(10), chr(10) + '    ')}\n"
     done = python(f"{code}\nexcept InputError as error:\n    print(error)\n", None)

@@ -23,7 +23,6 @@ from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.execution.transfer import is_tilted
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.obstacles import obstacle
-from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
 from tests.round_scenes import contacts, scenario
 
 
@@ -45,7 +44,7 @@ def nominal(scene: Scene, schedule: tuple[Step, ...] = ()) -> Plan:
 
 def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float, poses: Poses) -> float:
     """How deep the gripper is in any part but the moved one."""
-    boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
+    boxes = gripper_boxes(scene.kinematics, opening)
     T = T_part @ T_tip
     around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
     return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.pieces, o.T)[0]) for o in around)
@@ -71,16 +70,6 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
         assert depth(pockets, move, at, second.T_part_tip, second.half_width + 0.008, poses) <= 0.0
 
 
-def test_pulling_out_is_pushing_in_backwards(pockets: Scene) -> None:
-    schedule = (*(Step(k) for k in range(5)), Step(4, undo=True))
-    done = moves(nominal(pockets, schedule), pockets)
-    into = done[4].transfer
-    out = done[5].transfer
-    assert out.out.left == into.into.left
-    assert [g.T_part_tip[0, 3] for g in out.grips] == [g.T_part_tip[0, 3] for g in reversed(into.grips)]
-    np.testing.assert_allclose(out.T_world_goal, into.T_world_start)
-
-
 def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
     schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
     done = moves(nominal(fixture, schedule), fixture)
@@ -99,34 +88,6 @@ def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_
 def fixture_side(scene: Scene) -> Array:
     """From castle 2 to the cube."""
     return nominal(scene).target_poses[2][:3, 1]
-
-
-def test_a_part_is_centred_across_walls_that_are_along_none_of_its_axes(tmp_path: Path) -> None:
-    """A block with sides turned by 30 degrees in its frame: held across two, centred across those that will touch."""
-    turn = pose.at((0, 0, 0), (0, 0, -30))[:2, :2]
-    corners = [(float(x), float(y)) for x, y in np.array([(-20, -20), (20, -20), (20, 20), (-20, 20)]) @ turn.T]
-    block = extrude(polygon(*corners, names=("ny", "px", "py", "nx")), 0, 30, bottom="bottom", top="top")
-    operations = [
-        Operation("first", contacts("first", "bottom-table.top")),
-        Operation("second", contacts("second", "bottom-table.top", "nx-first.px")),
-    ]
-    x, y = (np.append(axis, 0.0) for axis in turn.T)
-    grasps = [Grasp(np.array([0.0, 0.0, 0.02]), y), Grasp(np.array([0.0, 0.0, 0.02]), y)]
-    start = {"first": pose.at((0, -0.27, 0)), "second": pose.at((0, 0.27, 0))}
-    goals = [np.eye(4), pose.at(0.04 * x)]
-    scene = build_scene(scenario(tmp_path, {"first": block, "second": block}, operations, goals, start, grasps))
-    (centring,) = moves(nominal(scene), scene)[0].transfer.centring
-    assert abs(centring.T_part_tip[:3, 0] @ x) == pytest.approx(1.0)
-
-
-def test_a_wrist_turns_back_instead_of_winding_up() -> None:
-    rest = pose.at((0, 0, 0.3), (180, 0, 0))
-    start, end = (pose.at((x, 0, 0), (0, 0, turn)) @ rest for x, turn in ((0.0, 100), (0.2, -110)))
-    middle, last = waypoints_unwound(rest, start, end)
-    assert np.array_equal(last, end)
-    assert np.degrees(turn_from(rest, middle)) == pytest.approx(-5)
-    np.testing.assert_allclose(middle[:3, 3], (0.1, 0, 0.3), atol=1e-12)
-    assert len(waypoints_unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1
 
 
 SIDEWAYS = Grasp(np.array([0.018, 0.0, 0.026]), np.array([0.0, 1.0, 0.0]))

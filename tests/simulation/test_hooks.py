@@ -81,14 +81,6 @@ def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
     assert calls.order == [("replay", plan), ("tick", None), ("before", Step(0)), ("tick", 0)]
 
 
-def test_of_a_plan_that_is_refused_the_plan_is_said_and_no_step(scene: Scene, layout: Layout) -> None:
-    calls = Calls()
-    far = np.array([pose.at((3.0, 0.0, 0.0)) @ T for T in layout.poses])
-    plan = Plan(scene.scenario.assembly, layout.start, far)
-    assert replay(plan, scene, calls.hooks, config=ExecutionConfig("near-contact")).outcome.stage == "plan"
-    assert calls.order == [("replay", plan), ("tick", None)]
-
-
 def test_a_function_of_the_state_is_a_hook_too() -> None:
     seen = []
 

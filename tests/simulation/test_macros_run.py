@@ -59,28 +59,12 @@ def test_a_bottom_is_felt(tmp_path: Path, short_mm: float) -> None:
     assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
 
 
-def test_the_end_of_a_slot_is_felt(tmp_path: Path) -> None:
-    stand = {"castle": ("castle", (0, 0, 0)), "stop": ("block", (135, 0, 25))}
-    goal = f'goal = {{ at_mm = [0, 0, 40] }}\ncontacts = [{SLOT}, ["px", "stop.nx"]]'
-    scenario = own(tmp_path, goal, **stand)
-    assert names(scenario) == [["insert-into-slot", "move-to-contact", "slide-to-contact"]]
-    assert done(scenario, (-3.0, 0, 0)).verdict.as_demonstrated
-
-
 def test_a_slot_may_be_entered_from_its_end(tmp_path: Path) -> None:
     goal = f'goal = {{ at_mm = [0, 0, 40] }}\ncontacts = [{SLOT}]\nattach = {{ along = "-x" }}'
     scenario = own(tmp_path, goal, castle=("castle", (0, 0, 0)))
     assert names(scenario) == [["insert-into-slot", "move-to-contact"]]
     assert scenario.attach[0].direction.tolist() == [-1.0, 0.0, 0.0]
     assert done(scenario).verdict.as_demonstrated
-
-
-def test_a_level_way_may_end_in_a_slide(tmp_path: Path) -> None:
-    goal = 'goal = { at_mm = [0, 0, 10] }\ncontacts = [["nz", "table.top"], ["px", "stop.nx"]]\n'
-    goal += 'attach = { along = "+x", travel_mm = 60 }'
-    scenario = own(tmp_path, goal, stop=("block", (135, 0, 25)))
-    assert names(scenario) == [["move-to-contact", "slide-to-contact"]]
-    assert done(scenario, (-2.0, 0, 0)).verdict.as_demonstrated
 
 
 def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:

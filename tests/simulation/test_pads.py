@@ -26,8 +26,3 @@ def test_four_boxes_with_grooves_between_them_become_one() -> None:
 @pytest.mark.parametrize("apart", [0.006, 0.0145])
 def test_boxes_that_touch_or_stand_far_apart_stay_two(apart: float) -> None:
     assert len(boxes("finger", (0.0, 0.0), (apart, 0.0))) == 2
-
-
-def test_boxes_of_a_link_of_the_arm_and_boxes_beside_each_other_stay() -> None:
-    assert len(boxes("arm", (0.0, 0.0), (0.01, 0.0))) == 2
-    assert len(boxes("finger", (0.0, 0.0), (0.01, 0.001))) == 2

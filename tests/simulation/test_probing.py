@@ -11,7 +11,6 @@ from apo_bench.geometry import pose
 from apo_bench.records import ft_noise
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
 from apo_bench.simulation.execution.probing.state import ProbingState, touch_guard
 from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
@@ -81,13 +80,6 @@ def test_a_robot_that_may_be_far_off_begins_farther_away():
     assert len(walls) == 4
 
 
-def test_a_robot_that_is_as_far_off_as_it_was_told_feels_the_floor():
-    error = drawn("stick_in_tower", "tool:5")
-    estimate = found_out("stick_in_tower", error, stated="tool:5")
-    assert len(estimate.touches) == 3
-    assert estimate.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
-
-
 def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
     name = "stick_in_tower"
     error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
@@ -107,21 +99,6 @@ def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
     assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 
-def test_walls_that_recede_are_expected_where_they_are():
-    """A pocket of 50 mm with 0.25 mm of room on each side: its walls are 50.5 mm apart, and looked at from inside."""
-    places = wall_places(plan("pocket_table"), scene("pocket_table"))
-    assert len(places) == 8
-    across = [
-        a.offset + b.offset
-        for i, a in enumerate(places)
-        for b in places[i + 1 :]
-        if a.normal @ b.normal < -0.99
-        and abs((a.T_world_tip - b.T_world_tip)[:3, 3] @ np.cross(a.normal, [0, 0, 1])) < 0.02
-    ]
-    widths = [-gap for gap in across if abs(gap) < 0.06]
-    assert widths == pytest.approx([0.0505] * 4, abs=1e-9)
-
-
 def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     """Turned by 1.7 degrees between the pads: laid on its small foot it is known to a degree, by a wall much better."""
     name = "peg_in_hole"
@@ -137,14 +114,6 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     )
     assert felt.verdict.success
     assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
-
-
-def test_a_robot_that_does_not_feel_does_nothing_besides():
-    for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True):
-        assert not move.transfer.squaring
-        assert move.transfer.flat is None
-        assert not move.transfer.side_touches
-        assert not move.transfer.in_last
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():

@@ -6,21 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import Film, InputError, Scene, camera_view, draw_layout, picture
+from apo_bench import Film, InputError, Scene, camera_view, draw_layout
 from apo_bench.simulation.scene.render import save_film
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.request import Request, run_request
 
 SIZE = (160, 120)
-
-
-def test_a_picture_shows_where_the_parts_are(tower: Scene) -> None:
-    layout = draw_layout(tower.scenario, np.random.default_rng(0))
-    before = picture(tower, layout.start, *SIZE)
-    after = picture(tower, {**layout.start, "castle1": layout.poses[0]}, *SIZE)
-    assert before.shape == (120, 160, 3)
-    assert np.abs(before.astype(int) - after).max() > 50
-    assert np.array_equal(before, picture(tower, layout.start, *SIZE))
 
 
 def test_the_end_of_one_film_does_not_spoil_the_next(tower: Scene) -> None:

@@ -145,7 +145,7 @@ def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) 
     assert cli.main(asked) == 0
     said = capsys.readouterr().out
     assert "this set of contacts is right with probability 0.9" in said or "with probability 1.00" in said
-    assert "all 9 contacts of the scenario were recognised, and no other" in said
+    assert "9 of the 9 contacts of the scenario are detected, and 0 others" in said
     assert cli.main([*asked, "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
     assert 0.9 < form["probability"] <= 1.0
@@ -172,7 +172,7 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
     path.write_text("\n".join([header, ",".join(cells), *rest]) + "\n", encoding="utf-8")
     assert cli.main(["detect-contacts", "stick_in_tower", "--observation", str(path), "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
-    assert form["schema"] == "apo-bench/recognised/2"
+    assert form["schema"] == "apo-bench/detected-contacts/1"
     assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
     assert form["contacts_false_negative"] == len(form["missed"])
     assert form["contacts_true_positive"] == sum(contact["in_scenario"] for contact in form["contacts"])
@@ -182,13 +182,13 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["detect-contacts", "stick_in_tower", "--contact-source", "given"], "unknown way of recognising 'given'"),
+        (["detect-contacts", "stick_in_tower", "--contact-source", "given"], "unknown contact source 'given'"),
         (
             ["detect-contacts", "stick_in_tower", "--observation", SEEN, "--noise-level", "1"],
             "--noise-level, which draws a trial",
         ),
         (
-            ["run", "stick_in_tower", "--observation", SEEN, "--contact-source", "missed"],
+            ["run", "stick_in_tower", "--observation", SEEN, "--contact-source", "false-negative"],
             "--contact-source was given together",
         ),
     ],

@@ -1,18 +1,18 @@
-"""Pictures of relation graphs: parts stand above what they were put on, and files are what their names say."""
+"""Relation graphs: each part above the parts it lies on, and files are what their names say."""
 
 from __future__ import annotations
 
-import re
-from itertools import combinations, pairwise
 from pathlib import Path
 
 import pytest
 
 from apo_bench.assembly import Graph, relation_graph
-from apo_bench.viz.graph.drawing import draw_graph
-from apo_bench.viz.graph.layout import Bend, layout_graph
-from apo_bench.viz.graph.text import mermaid_text
+from apo_bench.viz.graph_picture import draw_graph, place_nodes
+from apo_bench.viz.graph_text import graph_form, graph_lines, mermaid_text
 from tests import rounds, scenes
+
+SOME = [None, *([2e-3] * 8)]
+"""Residuals of the graph of Fig. 7: one unknown, the others too large."""
 
 
 def graph_of(name: str, step: int | None = None) -> Graph:
@@ -20,76 +20,68 @@ def graph_of(name: str, step: int | None = None) -> Graph:
 
 
 @pytest.mark.parametrize("name", scenes.ALL)
-def test_arrows_lead_down_row_by_row_and_do_not_cross(name: str) -> None:
+def test_every_part_is_above_what_it_lies_on_and_no_two_share_a_place(name: str) -> None:
     for step in range(1, len(scenes.ALL[name]().assembly) + 1):
         graph = graph_of(name, step)
-        layout = layout_graph(graph)
-        links = [link for route in layout.routes for link in pairwise(route)]
-        assert all(layout.row[a] == layout.row[b] + 1 for a, b in links)
-        for arc, route in zip(graph.arcs, layout.routes, strict=True):
-            assert (route[0], route[-1]) == (arc.manipulated, arc.environment)
-            assert all(isinstance(item, Bend) for item in route[1:-1])
-        above = [(layout.row[a], layout.column[a], layout.column[b]) for a, b in links if b != layout.ground]
-        assert not any(r == s and (a - c) * (b - d) < 0 for (r, a, b), (s, c, d) in combinations(above, 2))
-        places = [(layout.row[item], layout.column[item]) for item in layout.row]
-        assert len(set(places)) == len(places) >= len(graph.nodes)
+        places = place_nodes(graph)
+        assert set(places) == set(graph.nodes)
+        assert len(set(places.values())) == len(places)
+        assert all(places[arc.manipulated][1] > places[arc.environment][1] for arc in graph.arcs)
 
 
 @pytest.mark.parametrize(("suffix", "head"), [(".png", b"\x89PNG"), (".svg", b"<?xml")])
-def test_a_picture_is_written(suffix: str, head: bytes, tmp_path: Path) -> None:
+def test_a_picture_is_the_same_every_time(suffix: str, head: bytes, tmp_path: Path) -> None:
     graph = graph_of("pockets", 6)
     paths = [tmp_path / f"{name}{suffix}" for name in ("one", "two", "other")]
-    some = [None, *([2e-3] * 8)]
-    for path, residuals in zip(paths, (some, some, [0.0] * 9), strict=True):
-        draw_graph(graph, path, title="Fig. 7", residuals=residuals, gap_m=1e-4)
+    for path, residuals in zip(paths, (SOME, SOME, [0.0] * 9), strict=True):
+        draw_graph(graph, path, "Fig. 7", residuals=residuals, gap_m=1e-4, colors={})
     one, two, other = (path.read_bytes() for path in paths)
     assert one.startswith(head)
     assert one == two
     assert one != other
 
 
-@pytest.fixture
-def readable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Letters of SVG files are text."""
+def test_words_dashes_and_colours_are_in_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Placements that parts have left, and contacts that disappeared, are dashed."""
     import matplotlib
 
     monkeypatch.setitem(matplotlib.rcParamsDefault, "svg.fonttype", "none")
-
-
-@pytest.mark.usefixtures("readable")
-def test_words_are_in_the_picture(tmp_path: Path) -> None:
-    draw_graph(graph_of("pockets", 6), tmp_path / "a.svg", title="Fig. 7", residuals=[None, *([2e-3] * 8)], gap_m=1e-4)
+    draw_graph(graph_of("pockets", 6), tmp_path / "a.svg", "Fig. 7", residuals=SOME, gap_m=1e-4, colors={})
     text = (tmp_path / "a.svg").read_text(encoding="utf-8")
-    for words in ("Fig. 7", "cube3", "R9", "2.00 mm", "not seen", "dashed: disappeared; red: above 0.1 mm"):
+    for words in ("Fig. 7", "cube3", "R9", "2.00 mm", "dashed: disappeared", "red: above 0.1 mm"):
         assert words in text
-    assert text.count("#c8102e") >= 16
-
-
-@pytest.mark.usefixtures("readable")
-def test_arcs_with_an_axis_are_dash_dot(tmp_path: Path) -> None:
-    for scene, said in ((rounds.through(), True), (scenes.stick_in_tower(), False)):
-        graph = relation_graph(scene.assembly)
-        assert {arc.name for arc in graph.arcs if arc.axial} == ({"R3", "R4"} if said else set())
-        draw_graph(graph, tmp_path / "a.svg", title="graph")
-        assert ("dash-dot: about an axis" in (tmp_path / "a.svg").read_text(encoding="utf-8")) is said
-
-
-def test_what_no_longer_stands_is_dashed(tmp_path: Path) -> None:
-    """Fig. 7: placements that parts have left, and contacts that are gone, have dashed outlines; nothing else has."""
-    graph = graph_of("pockets", 6)
-    draw_graph(graph, tmp_path / "a.svg", title="Fig. 7")
-    styles = re.findall(
-        r'style="(fill: #[0-9a-f]{6};[^"]*stroke: #[0-9a-f]{6}[^"]*)"', (tmp_path / "a.svg").read_text()
-    )
-    boxes = [style for style in styles if "stroke-linejoin: miter" in style]
-    left = [style for style in boxes if "stroke: #8a8a8a" in style and "stroke-dasharray" in style]
-    assert len(left) >= sum(not graph.stands(node) for node in graph.nodes) == 3
+    assert text.lower().count("#c8102e") >= 16
+    draw_graph(graph_of("stick_in_tower"), tmp_path / "b.svg", "whole", colors={})
+    draw_graph(relation_graph(rounds.through().assembly), tmp_path / "c.svg", "axial", colors={})
+    dashes = [(tmp_path / f"{name}.svg").read_text().count("stroke-dasharray") for name in "abc"]
+    assert dashes[0] >= 3
+    assert dashes[1] == 0
+    assert dashes[2] >= 2
 
 
 def test_mermaid_text_has_every_part_and_arc() -> None:
-    lines = mermaid_text(graph_of("pockets", 6)).splitlines()
     graph = graph_of("pockets", 6)
+    lines = mermaid_text(graph).splitlines()
     assert lines[0] == "flowchart TD"
     assert len(lines) == 1 + len(graph.nodes) + len(graph.arcs)
     assert sum("-.->" in line for line in lines) == sum(arc.lost is not None for arc in graph.arcs)
     assert any('["cube2<br>T6 T5^-1 T2"]' in line for line in lines)
+
+
+def test_residuals_are_shown_with_the_gap_that_they_exceed() -> None:
+    graph = graph_of("pockets", 6)
+    residuals = [None, *([2e-3] * 7), 5e-5]
+    lines = graph_lines(graph, residuals, 1e-4)
+    arcs = [line for line in lines if line.startswith("R")]
+    assert arcs[0].endswith("]")
+    assert all(line.endswith("2.000 mm, above 0.1") for line in arcs[1:8])
+    assert arcs[8].endswith("0.050 mm")
+    assert "made 1, lost at 4" in arcs[0]
+    assert [line.split("  ")[0] for line in lines if line.endswith("moved on")] == [
+        "cube1 (1): T1",
+        "cube2 (2): T2",
+        "cube3 (3): T3",
+    ]
+    form = graph_form("pockets", graph, residuals)
+    assert [arc["residual_mm"] for arc in form["arcs"]] == [None, *([2.0] * 7), 0.05]
+    assert [node["stands"] for node in form["nodes"]] == [True, False, False, False, True, True, True, True]

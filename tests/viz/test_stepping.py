@@ -21,8 +21,8 @@ from apo_bench.simulation.film.track import part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
-from apo_bench.viz.finished_trial import trial_again
 from apo_bench.viz.stepping import FACES, Cursor
+from apo_bench.viz.trial_again import repeat_trial
 
 
 def with_target_poses(scene: Scene) -> Rollout:
@@ -172,7 +172,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
         fidelity="near-contact",
     )
     (row,) = run_sweep(asked, tmp_path / "run")
-    again, rollout = trial_again(tmp_path / "run", None)
+    again, rollout = repeat_trial(tmp_path / "run", None)
     assert {name: again[name] for name in ("success", "worst_gap_mm")} == {
         name: row[name] for name in ("success", "worst_gap_mm")
     }
@@ -191,10 +191,10 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
     monkeypatch.setattr("apo_bench.viz.viewing.no_browser", lambda: "viser is not installed")
     said = {
         ("view", "stick_in_tower"): "no window can be opened here (none), and for a browser viser is not installed",
-        ("view", "stick_in_tower", "--port", "8090"): "--port 8090 was given, which is for a browser, but viser is not",
-        ("view", "stick_in_tower", "--port", "70000"): "a whole number from 1 to 65535 is allowed",
-        ("view", "stick_in_tower", "--trial", "1"): "--trial, which is for the folder of a sweep",
-        ("run", "stick_in_tower", "--port", "8090"): "--port 8090, which is for --view, was given without it",
+        ("view", "stick_in_tower", "--port", "8090"): "--port 8090 needs a browser, but viser is not",
+        ("view", "stick_in_tower", "--port", "70000"): "--port must be from 1 to 65535, got 70000",
+        ("view", "stick_in_tower", "--trial", "1"): "--trial and --secret-seed-file belong to the folder of a sweep",
+        ("run", "stick_in_tower", "--port", "8090"): "--port 8090 belongs to --view",
         ("run", "stick_in_tower", "--view"): "no window can be opened here (none)",
     }
     for request, sentence in said.items():
@@ -204,10 +204,10 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
 
 def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
     pytest.importorskip("viser")
-    from apo_bench.viz.browser import serve_story
+    from apo_bench.viz.browser import serve_rollout
 
     said: list[str] = []
-    serve_story(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
+    serve_rollout(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
     assert said[0].startswith("Open http://127.0.0.1:18")
 
 
@@ -233,7 +233,7 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
         page.draw()
         assert cursor.place == place == server.gui.add_slider.return_value.value
     click("play / stop")
-    click("goals")
+    click("target poses")
     page.draw()
     assert (cursor.playing, cursor.shows_goals) == (True, True)
     click("play / stop")

@@ -5,25 +5,20 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from apo_bench import Correction, Observation
-from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
+from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
-from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
-from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.viz.arm_text import list_line
-from apo_bench.viz.correct_text import correction_form, correction_lines, correction_tables
-from apo_bench.viz.fit_text import fit_form, fit_lines
-from apo_bench.viz.graph.text import graph_form, graph_lines
-from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
-from tests import bop_made, scenes
+from apo_bench.viz.correct_text import POSE_COLUMNS, correction_form, correction_lines
+from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
+from apo_bench.viz.tables import form_table
+from tests import scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
 BESIDE = Contact(PartFace("castle1", "py"), PartFace("table", "top"))
@@ -59,7 +54,7 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     observation = tower()
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
     recognised = DetectedContacts(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
-    form = recognition_form("tower", "detected", observation, recognised, False)
+    form = detection_form("tower", "detected", observation, recognised, False)
     _, right, wrong = table_lines(evidence_table(form))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
     assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
@@ -72,17 +67,17 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     json.dumps(form, allow_nan=False)
 
 
-def test_a_set_of_contacts_that_is_not_likely_is_called_not_certain() -> None:
+def test_a_set_of_contacts_that_is_not_likely_is_called_uncertain() -> None:
     observation = tower()
     solids = list(observation.assembly.solids.values())
     fewer = scenes.scene(solids, observation.assembly.operations[:2], scenes.stick_in_tower().goals[:2])
     recognised = DetectedContacts(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
 
     def said(recognised: DetectedContacts) -> list[str]:
-        return confidence_lines(recognition_form("tower", "detected", observation, recognised, False))
+        return confidence_lines(detection_form("tower", "detected", observation, recognised, False))
 
     (line,) = said(recognised)
-    assert line.startswith("not certain: this set of contacts is right with probability 0.75")
+    assert line.startswith("uncertain: this set of contacts is right with probability 0.75")
     assert "the next (0.25) is without 3: stick." in line
     assert said(replace(recognised, probability=0.95, rival=None))[0].startswith("this set")
     assert said(replace(recognised, probability=None)) == []
@@ -93,39 +88,22 @@ def test_contacts_that_were_missed_are_named() -> None:
     every = tuple(evidence_of(r.contact, r.made) for r in observation.assembly.relations())
     fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
     forms = [
-        recognition_form("tower", "detected", observation, recognised, False)
+        detection_form("tower", "detected", observation, recognised, False)
         for recognised in (DetectedContacts(observation.assembly, every), DetectedContacts(fewer.assembly, every[:1]))
     ]
-    assert difference_lines(forms[0]) == [f"all {len(every)} contacts of the scenario were recognised, and no other"]
+    assert difference_lines(forms[0]) == [
+        f"{len(every)} of the {len(every)} contacts of the scenario are detected, and 0 others"
+    ]
     first, *missed = difference_lines(forms[1])
     assert first.startswith(f"1 of the {len(every)} contacts")
     assert len(missed) == len(every) - 1
     assert missed[0].startswith("missed: 2: castle2.")
 
 
-def test_residuals_of_a_graph_are_said_with_what_is_above_the_gap() -> None:
-    graph = relation_graph(scenes.pockets().assembly, 6)
-    lines = graph_lines("pockets", graph, [None, *([2e-3] * 7), 5e-5], 1e-4)
-    arcs = [line for line in lines if line.startswith("R")]
-    assert arcs[0].endswith("not seen")
-    assert all(line.endswith("2.000 mm, above 0.1") for line in arcs[1:8])
-    assert arcs[8].endswith("0.050 mm")
-    assert "made 1, lost at 4" in arcs[0]
-    assert [line.split("  ")[0] for line in lines if line.endswith("moved on")] == [
-        "cube1 (1): T1",
-        "cube2 (2): T2",
-        "cube3 (3): T3",
-    ]
-    form = graph_form("pockets", graph, [None, *([2e-3] * 7), 5e-5])
-    assert [arc["residual_mm"] for arc in form["arcs"]] == [None, *([2.0] * 7), 0.05]
-    assert [node["stands"] for node in form["nodes"]] == [True, False, False, False, True, True, True, True]
-
-
 def test_a_correction_is_said_with_how_far_it_moved_each_goal() -> None:
     observation = tower()
     form = correction_form("tower", "contact", observation, corrected(observation), None, False)
-    (poses,) = correction_tables(form)
-    moved = [row[-2:] for row in table_lines(poses)[1:]]
+    moved = [row[-2:] for row in table_lines(form_table(form["operations"], POSE_COLUMNS))[1:]]
     assert moved == [["0.000", "0.000"], ["3.000", "2.000"], ["0.000", "0.000"]]
     second = form["operations"][1]
     assert (second["operation"], second["part"]) == (2, "castle2")
@@ -143,33 +121,3 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
     assert form["test"]["chi_square"] is None
     json.dumps(form, allow_nan=False)
     assert dict(correction_lines(failed, None))["test"].endswith("the contacts contradict each other")
-
-
-def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
-    from apo_bench.formats.bop import read_results
-    from apo_bench.formats.bop_truth import read_truth
-    from apo_bench.perception.observation.models.residuals import match_residuals
-
-    drawn = bop_made.draw(600, bop_made.Known(), np.random.default_rng(5))
-    estimates, truth = bop_made.files(tmp_path, drawn)
-    found = estimates.read_text(encoding="utf-8").splitlines()
-    absent = [",".join([*line.split(",")[:2], "77", *line.split(",")[3:]]) for line in found[1:61:5]]
-    estimates.write_text("\n".join([*found, *dict.fromkeys(absent)]) + "\n", encoding="utf-8")
-    seen = read_results(estimates)
-    residuals = match_residuals(seen, read_truth(truth, seen))
-    measured = fit_noise(residuals, "made")
-    figures = goodness_of_fit(residuals, measured)
-    form = fit_form(residuals, measured, figures)
-    assert (form["parts"], form["images"]) == (600, 120)
-    assert form["left_over"] == residuals.surplus > 0
-    said = dict(line.split("  ", 1) for line in fit_lines(form) if "  " in line)
-    assert said["left over"].strip() == str(residuals.surplus)
-    assert said["images"].strip() == "120"
-    json.dumps(form, allow_nan=False)
-
-
-def test_an_arm_is_listed_with_what_it_can_hold() -> None:
-    arm = find_arm("six_axis")
-    line = list_line("six_axis", arm)
-    assert line.startswith(f"six_axis: 6 joints, opens {2e3 * arm.opening_m:.1f} mm")
-    assert line.endswith(f"; {arm.control}")

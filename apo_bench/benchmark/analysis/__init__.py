@@ -1,6 +1,16 @@
 """Rates, paired comparisons, curves: numbers out of trial records."""
 
 from apo_bench.benchmark.analysis.calibration import calibrations
+from apo_bench.benchmark.analysis.condition import (
+    CONDITION_FIELDS,
+    Condition,
+    by_condition,
+    condition_of,
+    noise_label,
+    order,
+    rank,
+)
+from apo_bench.benchmark.analysis.detection import detections
 from apo_bench.benchmark.analysis.effort import efforts
 from apo_bench.benchmark.analysis.gaps import gaps
 from apo_bench.benchmark.analysis.half_level import HalfLevel
@@ -15,11 +25,9 @@ from apo_bench.benchmark.analysis.over_seeds import (
     threshold,
 )
 from apo_bench.benchmark.analysis.paired import Paired, tango
-from apo_bench.benchmark.analysis.place import PLACE_FIELDS, Place, by_place, noise_label, order, place_of, rank
 from apo_bench.benchmark.analysis.prediction import confusions
-from apo_bench.benchmark.analysis.probing import felt
-from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, Cell, Interval, Rate, Records, tally, wilson
-from apo_bench.benchmark.analysis.recognition import recognitions
+from apo_bench.benchmark.analysis.probing import probing_results
+from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, ConditionResult, Interval, Rate, Records, tally, wilson
 from apo_bench.benchmark.analysis.settings import level_of, level_unit, levels_of, members, noise_words, settings
 from apo_bench.benchmark.analysis.summary import Summary, summary
 from apo_bench.benchmark.analysis.timing import read_timing, trial_times, work
@@ -27,26 +35,27 @@ from apo_bench.benchmark.analysis.words import percent, percents, points, signed
 
 __all__ = (
     "ALL",
+    "CONDITION_FIELDS",
     "FEWEST_SEEDS",
     "NOT_EXECUTED",
-    "PLACE_FIELDS",
-    "Cell",
+    "Condition",
+    "ConditionResult",
     "Contrast",
     "HalfLevel",
     "Interval",
     "Line",
     "Paired",
-    "Place",
     "Rate",
     "Records",
     "Results",
     "Summary",
-    "by_place",
+    "by_condition",
     "calibrations",
+    "condition_of",
     "confusions",
     "contrast",
+    "detections",
     "efforts",
-    "felt",
     "gaps",
     "level_of",
     "level_unit",
@@ -58,12 +67,11 @@ __all__ = (
     "order",
     "percent",
     "percents",
-    "place_of",
     "points",
     "pooled_rate",
+    "probing_results",
     "rank",
     "read_timing",
-    "recognitions",
     "settings",
     "signed",
     "summary",

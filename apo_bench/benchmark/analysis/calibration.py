@@ -1,11 +1,11 @@
-"""How uncertain corrections say they are, and which relations their test finds wrong, against the truth."""
+"""Stated uncertainty of corrections, and the contacts that their test suspects, against the truth."""
 
 from typing import Any
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import rank, rank_contact_source
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import rank, rank_contact_source
 from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
 from apo_bench.records import knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
@@ -14,10 +14,11 @@ _AXES = ("scenario", "noise", "contact_source", "method")
 
 
 def calibrations(records: Records) -> list[Line]:
-    """One line per scenario, noise, relations and method; the oracle has nothing to be calibrated.
+    """One line per scenario, noise, contact source and method but the oracle.
 
-    Over every level, carelessness and clearance: how often the truth lies in the stated region, the errors of planned
-    poses along directions that contacts fix and leave free, and how often the test fails and names the culprit.
+    Over every noise level, human error scale and clearance: how often the truth lies in the stated region, the errors
+    of planned poses along directions that contacts fix and leave free, and how often the test fails and names the
+    culprit.
     """
     trials = trials_of(records)
     counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("noise_mm"))

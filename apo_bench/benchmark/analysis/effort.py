@@ -1,15 +1,15 @@
-"""What replays take: operations beyond doing each once, simulated time, how far finished parts were pushed."""
+"""Effort of replays: operations beyond doing each once, simulated time, how far finished parts were pushed."""
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import by_method
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import by_method
 from apo_bench.benchmark.analysis.rates import Records
 from apo_bench.records.run.trials import trials_of
 
 
 def efforts(records: Records) -> list[Line]:
-    """One line per scenario and method that had a success, of these trials, over every level and carelessness."""
+    """One line per scenario and method that had a success, of these trials, over every noise level and human error scale."""
     trials = trials_of(records)
     right = trials.where(trials.number("success") == 1)
     return [

@@ -14,8 +14,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.place import Place
-from apo_bench.benchmark.analysis.rates import CONFIDENCE, Cell
+from apo_bench.benchmark.analysis.condition import Condition
+from apo_bench.benchmark.analysis.rates import CONFIDENCE, ConditionResult
 from apo_bench.geometry import Array
 from apo_bench.io import grouped
 from apo_bench.records import DEPTH_CAMERA, knows_truth
@@ -26,7 +26,7 @@ from apo_bench.records import DEPTH_CAMERA, knows_truth
 class HalfLevel:
     """Where success is one half; levels in mm, as in records."""
 
-    place: Place
+    condition: Condition
     """At the level 0, which stands for all."""
     smallest: float
     """Of the levels tried that are above 0."""
@@ -58,16 +58,16 @@ class HalfLevel:
         return f"> {over}" if self.surely_under is None else f"{over} to {self.surely_under:g}"
 
 
-def half_levels(cells: Iterable[Cell]) -> tuple[HalfLevel, ...]:
+def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
     """One per method and setting that has two levels or more, in the order of the cells; the oracle meets no level.
 
     Where poses are drawn a level is as many degrees as mm; cells with another pair of the two are on no curve.
     """
     curves = grouped((c.curve, c) for c in cells if c.trials and _is_usual(c) and not knows_truth(c.method))
-    return tuple(half_level(place, own) for place, own in curves.items() if len(own) > 1)
+    return tuple(half_level(condition, own) for condition, own in curves.items() if len(own) > 1)
 
 
-def half_level(place: Place, cells: Sequence[Cell]) -> HalfLevel:
+def half_level(condition: Condition, cells: Sequence[ConditionResult]) -> HalfLevel:
     """Where the rates of cells at rising levels cross one half."""
     from scipy.optimize import isotonic_regression
 
@@ -80,7 +80,7 @@ def half_level(place: Place, cells: Sequence[Cell]) -> HalfLevel:
     falling = isotonic_regression((right / trials)[met], weights=trials[met], increasing=False).x
     beyond = "below" if falling[0] < 0.5 else "above" if falling[-1] > 0.5 else None
     return HalfLevel(
-        place=place,
+        condition=condition,
         smallest=float(levels[met][0]),
         largest=float(levels[-1]),
         trials=int(trials.sum()),
@@ -108,5 +108,5 @@ def sure(right: Array, trials: Array) -> tuple[Array, Array]:
     return np.cumprod(over, axis=-1).sum(axis=-1), np.cumprod(under[..., ::-1], axis=-1).sum(axis=-1)
 
 
-def _is_usual(cell: Cell) -> bool:
+def _is_usual(cell: ConditionResult) -> bool:
     return cell.noise_deg == (0.0 if cell.noise == DEPTH_CAMERA else cell.noise_mm)

@@ -1,15 +1,14 @@
-"""All trials of a sweep together: a rate, and a difference to another method, with intervals over seeds.
+"""Rates and differences over all trials of a sweep, with intervals over seeds.
 
-Trials of one seed share their random numbers, in every scenario and at every level. So seeds, and not trials, are
-independent: each gives one number, how many of its trials were right, and the intervals are those of the mean over
+Trials of one seed share their random numbers, in every scenario and at every noise level. So seeds, and not trials, are
+independent: each gives one number, how many of its trials succeeded, and the intervals are those of the mean over
 seeds. Where every seed has one trial they are Wilson's and Tango's.
 
-The interval of a mean asks for no distribution. Each seed gives one number between two bounds. A mean is believed
-unless the likeliest distribution between the bounds that has it is much less likely than what was seen. That is A. B.
-Owen's empirical likelihood (Biometrika 75, 1988, 237-249), except that the bounds themselves may carry probability
-though no seed was there, so that a sample in which all seeds are alike still has an interval. Twice the log ratio is
-held against Fisher's F with 1 and n - 1 degrees of freedom, which for many seeds is the chi-square of Wilks' theorem
-and for few is what Student's t would ask for (Owen's advice).
+The interval of a mean assumes no distribution. Each seed gives one number between two bounds. It holds the means whose
+likeliest distribution between the bounds is not much less likely than the sample: A. B. Owen's empirical likelihood
+(Biometrika 75, 1988, 237-249), except that the bounds may carry probability though no seed was there, so that a sample
+in which all seeds are equal still has an interval. Twice the log ratio is compared with Fisher's F with 1 and n - 1
+degrees of freedom (Owen's advice).
 """
 
 from typing import NamedTuple
@@ -27,8 +26,6 @@ FEWEST_SEEDS = 6
 """With fewer, not even a difference at every seed is beyond chance: 2 / 2^n is then over 5 % (sign test)."""
 _DIGITS = 12
 """Sums of the same numbers in another order are the same value to so many digits."""
-_HALVINGS = 48
-"""What is left is less than 1e-14 of the range."""
 _EDGE = 1e-9
 """A mean is not sought closer to a bound than this part of the way."""
 
@@ -122,35 +119,28 @@ def threshold(seeds: int) -> float:
     return float(fdtri(1, seeds - 1, CONFIDENCE)) if seeds > 1 else float("inf")
 
 
-def mean_surprise(
-    values: Array, counts: Array, mean: Array | float, low: Array | float = 0.0, high: Array | float = 1.0
-) -> Array:
-    """Twice the log likelihood ratio of a mean.
+def mean_surprise(values: Array, counts: Array, mean: float, low: float = 0.0, high: float = 1.0) -> float:
+    """Twice the log likelihood ratio of a mean, 0 at the mean of the sample.
 
     The likeliest weights are n_i / (n (1 + a (x_i - mean))); what they leave over lies on a bound. Twice the log ratio
     is the largest 2 sum n_i log(1 + a (x_i - mean)) over all a that keep the weights positive at both bounds.
 
     Args:
-        values: (..., k) from `low` to `high`.
-        counts: (..., k) how many seeds had each value.
-        mean: (...), strictly between `low` and `high`, which are (...) too, or numbers.
-
-    Returns:
-        (...), 0 where the mean is that of the sample.
+        values: (k,) from `low` to `high`.
+        counts: (k,) how many seeds had each value.
+        mean: Strictly between `low` and `high`.
     """
-    z = values - np.asarray(mean)[..., None]
-    # 1 + a (x - mean) > 0 at x = high and at x = low bounds the multiplier a from both sides
-    least = np.broadcast_to(-1.0 / (high - np.asarray(mean)), z.shape[:-1]).copy()
-    most = np.broadcast_to(1.0 / (np.asarray(mean) - low), z.shape[:-1]).copy()
-    for _ in range(_HALVINGS):
-        a = 0.5 * (least + most)
-        # the sum is concave in a: where its derivative is above 0 the largest value lies further up
-        rising = (counts * z / np.where(counts > 0, 1.0 + a[..., None] * z, 1.0)).sum(-1) > 0.0
-        least = np.where(rising, a, least)
-        most = np.where(rising, most, a)
-    # values that no seed had count as log(1) = 0, also those at which the bound for a makes it log(0)
-    factor = np.where(counts > 0, 1.0 + (0.5 * (least + most))[..., None] * z, 1.0)
-    return np.asarray(2.0 * (counts * np.log(np.maximum(factor, 1e-300))).sum(-1))
+    from scipy.optimize import minimize_scalar
+
+    # 1 + a (x - mean) > 0 at x = high and at x = low bounds the multiplier a from both sides; the sum is concave in a
+    bounds = (-1.0 / (high - mean), 1.0 / (mean - low))
+    best = minimize_scalar(
+        lambda a: -2.0 * float((counts * np.log(np.maximum(1.0 + a * (values - mean), 1e-300))).sum()),
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": 1e-12 * (bounds[1] - bounds[0])},
+    )
+    return max(0.0, -float(best.fun))
 
 
 def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interval:
@@ -172,14 +162,11 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     from scipy.optimize import brentq
 
     most = threshold(int(counts.sum()))
-
-    def beyond(mean: float) -> float:
-        return float(mean_surprise(values, counts, mean, low, high)) - most
-
     edge = _EDGE * (outside - inside)
-    if edge == 0.0 or beyond(outside - edge) <= 0.0:
+    if edge == 0.0 or mean_surprise(values, counts, outside - edge, low, high) <= most:
         return outside
-    return float(brentq(beyond, inside + edge, outside - edge, xtol=1e-9))
+    ends = inside + edge, outside - edge
+    return float(brentq(lambda mean: mean_surprise(values, counts, mean, low, high) - most, *ends, xtol=1e-9))
 
 
 def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:

@@ -1,4 +1,4 @@
-"""Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
+"""Paired comparison of two methods over the same seeds, so that layout, human and noise cancel."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,12 +7,13 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.place import Place, by_place
+from apo_bench.benchmark.analysis.condition import Condition, by_condition
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, mean
 from apo_bench.geometry import Array
-from apo_bench.records import TrialConfig, knows_truth, may_reobserve, probes, uses_contacts
+from apo_bench.records import TrialConfig, affects, knows_truth
 from apo_bench.records.run.trials import Trials, trials_of
 
+_PAIRED_BY_DEFAULT = ("contact_source", "max_reobservations", "ft_sensor", "assumed_robot_error")
 K = TypeVar("K", bound=Hashable)
 REFERENCES = ("paper", "uncorrected")
 _EDGE = 1e-9
@@ -22,9 +23,9 @@ _EDGE = 1e-9
 @final
 @dataclass(frozen=True)
 class Paired:
-    """A method against another one, in one cell."""
+    """A method against another one, in one condition."""
 
-    place: Place
+    condition: Condition
     """Of the method."""
     reference: str
     pairs: int
@@ -72,23 +73,23 @@ class Paired:
 
 
 def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
-    """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
+    """Every method but the oracle against every reference, condition by condition, sorted as `tally` sorts.
 
-    `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
+    A setting that does not affect the reference is a default in its records, so one reference serves several conditions.
     The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
 
     Raises:
         InputError: A trial is there twice.
     """
-    places = by_place(trials_of(records)).items()
-    counted = {place: own.where(~np.isnan(own.number("success"))) for place, own in places}
-    cells = {place: own for place, own in counted.items() if len(own)}
+    conditions = by_condition(trials_of(records)).items()
+    counted = {condition: own.where(~np.isnan(own.number("success"))) for condition, own in conditions}
+    cells = {condition: own for condition, own in counted.items() if len(own)}
     pairs = [
-        _paired(place, reference, cells[place], cells[other])
-        for place in cells
+        _paired(condition, reference, cells[condition], cells[other])
+        for condition in cells
         for reference in references
-        if not knows_truth(place.method) and (other := place_of_reference(place, reference)) in cells
-        if place.method != reference
+        if not knows_truth(condition.method) and (other := reference_condition(condition, reference)) in cells
+        if condition.method != reference
     ]
     raised = holm({_comparison(pair): pair.p for pair in pairs if pair.p is not None})
     return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in pairs)
@@ -107,18 +108,15 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
     return {test: adjusted[test] for test in p}
 
 
-def place_of_reference(place: Place, reference: str) -> Place:
-    """What a cell, or a curve, is compared with: `none` asks for no relations, few for looks, few robots feel."""
-    other = place._replace(
-        method=reference, max_reobservations=place.max_reobservations if may_reobserve(reference) else 0
-    )
-    if not probes(reference):
-        other = other._replace(ft_sensor=TrialConfig.ft_sensor, assumed_robot_error=TrialConfig.assumed_robot_error)
-    return other if uses_contacts(reference) else other._replace(contact_source="given")
+def reference_condition(condition: Condition, reference: str) -> Condition:
+    """The condition that a condition, or a curve, is compared with: settings that do not affect the reference are
+    defaults there."""
+    usual = {name: getattr(TrialConfig, name) for name in _PAIRED_BY_DEFAULT if not affects(name, reference)}
+    return replace(condition, method=reference, **usual)
 
 
-def _comparison(pair: Paired) -> frozenset[Place]:
-    return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
+def _comparison(pair: Paired) -> frozenset[Condition]:
+    return frozenset((pair.condition, reference_condition(pair.condition, pair.reference)))
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
@@ -171,7 +169,7 @@ def _score(b: int, c: int, n: int, delta: float) -> float:
     return float((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
 
 
-def _paired(place: Place, reference: str, ours: Trials, theirs: Trials) -> Paired:
+def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> Paired:
     _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
     ours = ours.where(i)
     theirs = theirs.where(j)
@@ -182,7 +180,7 @@ def _paired(place: Place, reference: str, ours: Trials, theirs: Trials) -> Paire
     apart = ours.number("planned_error_free_mm") - theirs.number("planned_error_free_mm")
     apart = apart[~np.isnan(apart)]
     return Paired(
-        place=place,
+        condition=condition,
         reference=reference,
         pairs=len(right),
         only_method=only_method,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import by_method
 from apo_bench.benchmark.analysis.line import ALL, Line
-from apo_bench.benchmark.analysis.place import by_method
 from apo_bench.benchmark.analysis.rates import Rate, Records, was_executed
 from apo_bench.records.run.trials import Trials, trials_of
 
@@ -11,9 +11,9 @@ from apo_bench.records.run.trials import Trials, trials_of
 def confusions(records: Records) -> list[Line]:
     """One line per scenario and method, sorted as `tally` sorts, and one of them all at the end.
 
-    Fitted means a success that was made as demonstrated: that is what a plan predicts. Of the trials that were rightly
-    predicted to fail, `stopped` are those at which the robot stopped at an operation, and `same_operation` those at
-    which it was the predicted one. Not executed is a trial without a plan, or with one that promised too little.
+    Fitted means a success made as demonstrated, which is what a plan predicts. Of the trials that were rightly
+    predicted to fail, `stopped` counts those in which the robot stopped at an operation, and `same_operation` those in
+    which it was the predicted one. A trial without an executed plan is not executed.
     """
     trials = trials_of(records)
     return [*(_line(*key, own) for key, own in by_method(trials).items()), _line(ALL, ALL, trials)]

@@ -1,48 +1,48 @@
-"""What robots that feel found out about themselves, beside what their errors were drawn with."""
+"""Estimates of robots that probe, against the standard deviations that their errors were drawn with."""
 
 import math
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import Condition, by_condition
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import Place, by_place
 from apo_bench.benchmark.analysis.rates import Records, root_mean_square
 from apo_bench.records import assumed_error, robot_sigmas
 from apo_bench.records.run.trials import Trials, trials_of
 
 
-def felt(records: Records) -> list[Line]:
-    """One line per cell of a robot that felt, sorted as `tally` sorts.
+def probing_results(records: Records) -> list[Line]:
+    """One line per condition of a robot that probed, sorted as `tally` sorts.
 
-    Lengths [mm] and angles [deg] are root mean squares of vectors: what the error of the base was drawn with, what the
-    robot was told of it (None if nothing), as it felt it in the end, and how far that may be wrong by its own account.
+    Lengths [mm] and angles [deg] are root mean squares of vectors: the error of the base as drawn, as assumed (None if
+    unknown), as estimated, and the stated standard deviation of the estimate.
     """
     trials = trials_of(records)
     own = trials.where(~np.isnan(trials.number("probe_contacts")))
-    return [_line(place, felt_there) for place, felt_there in by_place(own).items()]
+    return [_line(condition, felt_there) for condition, felt_there in by_condition(own).items()]
 
 
-def _line(place: Place, trials: Trials) -> Line:
-    told = assumed_error(place.assumed_robot_error, place.robot_error)
-    drawn_mm, drawn_deg = _as_vector(place.robot_error)
-    stated_mm, stated_deg = (None, None) if told is None else _as_vector(told)
+def _line(condition: Condition, trials: Trials) -> Line:
+    assumed = assumed_error(condition.assumed_robot_error, condition.robot_error)
+    drawn_mm, drawn_deg = _as_vector(condition.robot_error)
+    assumed_mm, assumed_deg = (None, None) if assumed is None else _as_vector(assumed)
     return {
-        "place": place,
+        "condition": condition,
         "trials": len(trials),
         "probe_contacts": float(trials.number("probe_contacts").mean()),
-        "refused": int(trials.number("probe_contacts_rejected").sum()),
+        "rejected": int(trials.number("probe_contacts_rejected").sum()),
         "drawn_mm": drawn_mm,
-        "stated_mm": stated_mm,
+        "assumed_mm": assumed_mm,
         "estimated_mm": root_mean_square(trials.number("base_error_estimate_mm")),
-        "sure_mm": root_mean_square(trials.number("base_error_std_mm")),
+        "std_mm": root_mean_square(trials.number("base_error_std_mm")),
         "drawn_deg": drawn_deg,
-        "stated_deg": stated_deg,
+        "assumed_deg": assumed_deg,
         "estimated_deg": root_mean_square(trials.number("base_error_estimate_deg")),
-        "sure_deg": root_mean_square(trials.number("base_error_std_deg")),
+        "std_deg": root_mean_square(trials.number("base_error_std_deg")),
     }
 
 
 def _as_vector(name: str) -> tuple[float, float]:
-    """Root mean squares of vectors of three axes, of where hand and eye believe each other."""
+    """Root mean squares of vectors of three axes, of the error of the base."""
     mm, deg = robot_sigmas(name).hand_eye
     return math.sqrt(3.0) * mm, math.sqrt(3.0) * deg

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.place import Place, by_place
+from apo_bench.benchmark.analysis.condition import Condition, by_condition
 from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Mask, Trials, trials_of
 
@@ -48,47 +48,43 @@ class Rate(NamedTuple):
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Cell(Place):
-    """What came out where only seeds differ."""
+class ConditionResult(Condition):
+    """The results of the trials of a condition."""
 
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
     """The finished assembly is right."""
     demonstrated: int
-    """Successes of which every contact was also made when and where it was shown."""
+    """Successes of which every contact was also made when and where it was demonstrated."""
     loose_successes: int
     not_executed: int
-    """Failures of which no plan was carried out: nothing was corrected, too little was promised, the plan was refused
-    before anything moved, or the worker died. They count as failures."""
+    """Failures without an executed plan: nothing was corrected, the predicted success was too low, the planner rejected
+    the plan, or the worker died. They count as failures."""
     abstained: int
-    """Those of them whose plan promised too little."""
+    """Those of them with too low a predicted success."""
     predicted_success: float | None
-    """Mean of what plans promised; None where no plan did."""
+    """Mean over the plans; None without one."""
     brier: float | None
-    """Mean squared difference of promise and success over the trials whose plan promised anything and was executed."""
+    """Mean squared difference of predicted success and success over the executed plans."""
     excluded: int
-    """Trials left out of every method alike, since the demonstration itself was not right."""
+    """Trials that no method counts, since the demonstration itself was not right."""
     failures: Mapping[str, int]
     """`stage: code` -> how many, most frequent first."""
 
     @property
-    def counted(self) -> Rate:
-        return Rate(self.successes, self.trials)
-
-    @property
     def rate(self) -> float | None:
         """Success rate; None without a trial that counts."""
-        return self.counted.rate
+        return Rate(self.successes, self.trials).rate
 
     @property
     def interval(self) -> Interval:
         """Wilson's 95 % interval of the success rate."""
-        return self.counted.interval
+        return wilson(self.successes, self.trials)
 
     @property
     def tightness(self) -> float | None:
-        """Clearance per side over level, mm per mm: small is tight; None where poses are seen exactly."""
+        """Clearance per side over noise level, mm per mm: small is tight; None where poses are observed exactly."""
         return self.clearance_mm / self.noise_mm if self.noise_mm > 0 else None
 
     @property
@@ -101,14 +97,14 @@ class Cell(Place):
 
     @property
     def executed(self) -> Rate:
-        """Success among the trials whose plan was carried out."""
+        """Success among the trials whose plan was executed."""
         return Rate(self.successes, self.trials - self.not_executed)
 
     @property
     def wrong_when_executed(self) -> float | None:
-        """Share of failures among the trials whose plan was carried out; None without one."""
-        right, done = self.executed
-        return Rate(done - right, done).rate
+        """Share of failures among the executed trials; None without one."""
+        right = self.executed.rate
+        return None if right is None else 1.0 - right
 
 
 @lru_cache(maxsize=65536)
@@ -122,13 +118,13 @@ def wilson(successes: int, trials: int) -> Interval:
     return Interval(float(interval.low), float(interval.high))
 
 
-def tally(records: Records) -> tuple[Cell, ...]:
+def tally(records: Records) -> tuple[ConditionResult, ...]:
     """Count trials into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
 
     Raises:
         InputError: A trial is there twice.
     """
-    return tuple(_cell(place, own) for place, own in by_place(trials_of(records)).items())
+    return tuple(_count(condition, own) for condition, own in by_condition(trials_of(records)).items())
 
 
 def mean(numbers: Array) -> float | None:
@@ -147,23 +143,25 @@ def was_executed(trials: Trials) -> Mask:
     return ~trials.holds("failure_stage", NOT_EXECUTED.__contains__)
 
 
-def _cell(place: Place, trials: Trials) -> Cell:
+def _count(condition: Condition, trials: Trials) -> ConditionResult:
     counted = trials.where(~np.isnan(trials.number("success")))
-    success = counted.number("success")
-    executed = was_executed(counted)
-    predicted_success = counted.number("predicted_success")
-    failed = counted.where(success == 0)
+    failed = counted.where(counted.number("success") == 0)
     why = Counter(map("{}: {}".format, failed.values("failure_stage"), failed.values("failure_code")))
-    return Cell(
-        **vars(place),
+    return ConditionResult(
+        **vars(condition),
         trials=len(counted),
-        successes=int(success.sum()),
+        successes=len(counted) - len(failed),
         demonstrated=int(np.nansum(counted.number("as_demonstrated"))),
         loose_successes=int(np.nansum(counted.number("loose_success"))),
-        not_executed=int((~executed).sum()),
-        abstained=int(failed.holds("failure_code", ("abstained",).__contains__).sum()),
-        predicted_success=mean(predicted_success),
-        brier=mean((predicted_success - success)[executed] ** 2),
+        not_executed=int((~was_executed(counted)).sum()),
+        abstained=sum(code == "abstained" for code in failed.values("failure_code")),
+        predicted_success=mean(counted.number("predicted_success")),
+        brier=brier_score(counted),
         excluded=len(trials) - len(counted),
         failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
     )
+
+
+def brier_score(counted: Trials) -> float | None:
+    """Mean squared difference of predicted success and success over the trials whose plan was executed."""
+    return mean((counted.number("predicted_success") - counted.number("success"))[was_executed(counted)] ** 2)

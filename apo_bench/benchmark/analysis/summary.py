@@ -1,18 +1,18 @@
-"""All that a report says in numbers about who succeeds, in one call."""
+"""Rates, paired differences and half levels of a report in one call."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from apo_bench.benchmark.analysis.half_level import HalfLevel, half_levels
 from apo_bench.benchmark.analysis.paired import REFERENCES, Paired, paired
-from apo_bench.benchmark.analysis.rates import Cell, Records, tally
+from apo_bench.benchmark.analysis.rates import ConditionResult, Records, tally
 from apo_bench.records.run.trials import trials_of
 
 
 class Summary(NamedTuple):
-    """Each sorted as `tally` sorts; nothing of it depends on chance or on the order of records."""
+    """Each sorted as `tally` sorts, whatever the order of records."""
 
-    cells: tuple[Cell, ...]
+    results: tuple[ConditionResult, ...]
     pairs: tuple[Paired, ...]
     half_levels: tuple[HalfLevel, ...]
 
@@ -27,5 +27,5 @@ def summary(records: Records, references: Sequence[str] = REFERENCES) -> Summary
         InputError: A trial is there twice.
     """
     trials = trials_of(records)
-    cells = tally(trials)
-    return Summary(cells, paired(trials, references), half_levels(cells))
+    results = tally(trials)
+    return Summary(results, paired(trials, references), half_levels(results))

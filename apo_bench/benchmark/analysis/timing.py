@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.benchmark.analysis.condition import rank
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.benchmark.analysis.place import rank
 from apo_bench.io import each_line, grouped
 from apo_bench.records.run.validation import timing_of
 

@@ -82,7 +82,7 @@ _WORDS = (
 _DATA_TYPES = {"string": "sc:Text", "bool": "sc:Boolean", "int": "sc:Integer"}
 
 
-def write_card(about: About, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]) -> None:
+def noise_sheet(about: About, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]) -> None:
     """Write `README.md`, and the same for programs: `croissant.json` (Croissant 1.0), with the hash of every file.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, write_card
+from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, noise_sheet
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
@@ -198,7 +198,7 @@ def write_parquet(found: Iterable[Replay], about: About, out: Path) -> tuple[int
     columns = [[each[name] for each in episodes] for name in EPISODES]
     write_columns([*EPISODES], columns, out / "episodes.parquet", KINDS)
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
-    write_card(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
+    noise_sheet(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
     return counted
 
 

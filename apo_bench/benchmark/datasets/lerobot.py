@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, write_card
+from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, noise_sheet
 from apo_bench.benchmark.datasets.episodes import KINDS
 from apo_bench.geometry import Array
 from apo_bench.io import replace_file, write_columns, write_file
@@ -101,7 +101,7 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
     of_episodes = {**_OF_EPISODE, **about.episodes}
-    write_card(about, out, counted, {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes})
+    noise_sheet(about, out, counted, {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes})
     return counted
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from apo_bench.benchmark.datasets.card import About, Field, Rollout
 from apo_bench.benchmark.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
-from apo_bench.benchmark.sweeps.stopping import Check, listening
+from apo_bench.benchmark.sweeps.stopping import Check, stop_at_signals
 from apo_bench.envs.policies import POLICIES, insert_env
 from apo_bench.errors import RAISED, InputError, missing_package, require, require_known
 from apo_bench.io import has_parquet, write_file
@@ -199,7 +199,7 @@ def make_dataset(
         scenes = {each.scenario: scene_of(each) for each in trials}
         about = about_replays([*scenes.values()], command, trials[0].arm)
         found = replays(trials, scenes)
-    with listening() as check, _unfinished(out):
+    with stop_at_signals(patience=1) as check, _unfinished(out):
         found = _to_the_end(found, ends, check)
         if form == "parquet":
             counted = write_parquet(found, about, out)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.benchmark.datasets.card import About, Field, Rollout, write_card
+from apo_bench.benchmark.datasets.card import About, Field, Rollout, noise_sheet
 from apo_bench.errors import missing_package
 from apo_bench.io import replace_file, write_file
 
@@ -86,7 +86,7 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN},
         f"{where}: attributes of each": {**_OF_EPISODE, **about.episodes},
     }
-    write_card(about, out, (episodes, right), tables)
+    noise_sheet(about, out, (episodes, right), tables)
     return episodes, right
 
 

@@ -1,7 +1,7 @@
-"""What a sweep answers, in some sentences: what was counted first, then what the counts tell.
+"""The answer of a sweep in some sentences: the counts first, then what follows from them.
 
-No sentence says more than its counts: an interval only where there are seeds enough for one, "more often" only where
-the difference is beyond chance, "as often" only where the interval lies close around 0.
+No sentence states more than its counts: an interval only with enough seeds, "more often" only if the difference is
+beyond chance, "as often" only if the interval lies close around 0.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +10,8 @@ from functools import reduce
 import numpy as np
 
 from apo_bench.benchmark.analysis import (
+    CONDITION_FIELDS,
     FEWEST_SEEDS,
-    PLACE_FIELDS,
     Contrast,
     HalfLevel,
     Records,
@@ -33,7 +33,7 @@ _AGAINST = ("uncorrected", "paper", "contact", CORRECTOR)
 """The best method is compared with these; if none of them was tried, with the next best."""
 _GIVEN = "given"
 _SAME_TRIAL = (
-    *(name for name in PLACE_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
+    *(name for name in CONDITION_FIELDS if name not in ("method", "contact_source", "max_reobservations")),
     "seed",
 )
 _Who = tuple[str, int]
@@ -46,21 +46,21 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     quoted = ", ".join(f"`{kind}`" for kind in kinds)
-    told = "" if kinds == [_GIVEN] else f" Correctors were told relations {quoted} here, not `{_GIVEN}`."
+    wrong = "" if kinds == [_GIVEN] else f" Correctors used the contacts {quoted} here, not `{_GIVEN}`."
     best, *others = _ranked(results)
     if not any(own.success.any() for own in results.values()):
         counts = ", ".join(f"{_named(who)} in 0 of {len(results[who].seed):,}" for who in (best, *others))
-        return f"No method succeeds in any trial: {counts}.{told}"
+        return f"No method succeeds in any trial: {counts}.{wrong}"
     own = pooled_rate(results[best])
     half = [
         h
         for h in half_levels
-        if (h.place.method, h.place.max_reobservations) == best and h.place.contact_source in kinds
+        if (h.condition.method, h.condition.max_reobservations) == best and h.condition.contact_source in kinds
     ]
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
     reached = _reach(half) if own.seeds >= FEWEST_SEEDS else ""
     sentences = (_counted(best, own), reached, *(_compared(best, who, results) for who in known), _few(own))
-    return " ".join(filter(None, sentences)) + told
+    return " ".join(filter(None, sentences)) + wrong
 
 
 def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
@@ -83,7 +83,7 @@ def _results(records: Records) -> tuple[dict[_Who, Results], list[str]]:
 
 
 def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
-    """The best first, by trials that all have that were tried in half of all places or more."""
+    """The best first, by trials that all have that were tried in half of all conditions or more."""
     most = max(len(own.trial) for own in results.values())
     widely = {who: own for who, own in results.items() if 2 * len(own.trial) >= most}
     common = reduce(np.intersect1d, (own.trial for own in widely.values()))
@@ -96,11 +96,9 @@ def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
 
 
 def _named(who: _Who) -> str:
-    """`contact`, or `contact-robust` with 2 more looks."""
-    method, max_reobservations = who
-    return f"`{method}`" + (
-        f" with {max_reobservations} more look{'s' * (max_reobservations > 1)}" if max_reobservations else ""
-    )
+    """`contact`, or `contact-robust` with 2 reobservations."""
+    method, reobservations = who
+    return f"`{method}`" + f" with {reobservations} reobservations" * (reobservations > 0)
 
 
 def _counted(who: _Who, own: PooledRate) -> str:
@@ -126,10 +124,10 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     which = "each" if worst.beyond == "above" else "the worst"
     where = f"In {which} of {len(half)} settings its" if len(half) > 1 else "Its"
     if worst.beyond == "above":
-        return f"{where} curve over the level stays above one half up to level {worst.largest:g}, the largest tried."
+        return f"{where} success stays above one half up to noise level {worst.largest:g}, the largest tried."
     if worst.beyond == "below":
-        return f"{where} curve over the level is below one half from level {worst.smallest:g}, the smallest tried, on."
-    return f"{where} curve over the level falls to one half at level {worst.text} (surely: {worst.sure_text})."
+        return f"{where} success is below one half from noise level {worst.smallest:g}, the smallest tried, on."
+    return f"{where} success falls to one half at noise level {worst.text} (surely: {worst.sure_text})."
 
 
 def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:

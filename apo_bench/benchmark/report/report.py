@@ -1,20 +1,20 @@
-"""The report of a sweep: one page that answers, tables and figures beside it."""
+"""Write the report of a sweep: one page that answers, with tables and figures next to it."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.benchmark.analysis import (
-    Cell,
+    ConditionResult,
     Line,
     Summary,
     calibrations,
     confusions,
+    detections,
     efforts,
-    felt,
     gaps,
+    probing_results,
     read_timing,
-    recognitions,
     settings,
     summary,
     trial_times,
@@ -24,14 +24,14 @@ from apo_bench.benchmark.report.answer import answer
 from apo_bench.benchmark.report.figures.figures import figures
 from apo_bench.benchmark.report.page.report_page import Contents, report_page
 from apo_bench.benchmark.report.pictures import Draw, Pictures, draw_failures
-from apo_bench.benchmark.report.tables.cells import cell_table, half_table, pair_table
+from apo_bench.benchmark.report.tables.conditions import condition_table, half_table, pair_table
 from apo_bench.benchmark.report.tables.methods import (
     calibration_table,
     confusion_table,
+    detection_table,
     effort_table,
-    felt_table,
     gap_table,
-    recognition_table,
+    probing_table,
     time_table,
     work_table,
 )
@@ -43,12 +43,12 @@ from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
-PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "detected")
+PNG = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations", "detected")
 """Figures that are also kept as PNG."""
-FILES = ("cells", "pairs", "half_levels", "detected", "gaps", "confusion", "felt", "times")
-"""Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
-_IF_ANY = ("detected", "felt", "times")
-_OURS = (*FILES, *PNG, "rows", "failure_stages", "gap_before_and_after", "prediction", "timing")
+FILES = ("conditions", "pairs", "half_levels", "detected", "gaps", "confusion", "probing", "times")
+"""Tables that are also kept as files; those of `_IF_ANY` only with a line."""
+_IF_ANY = ("detected", "probing", "times")
+_OURS = (*FILES, *PNG, "records", "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of our tables and figures, without endings; `difference_to_..` is ours too."""
 PAGE = "report.html"
 TABLES = "tables"
@@ -60,13 +60,12 @@ class Report(NamedTuple):
 
     page: Path
     answer: str
-    """What the sweep says, in some sentences, with methods in backquotes."""
+    """Some sentences, with methods in backquotes."""
     tables: Mapping[str, Path]
-    """All, as CSV, by what they are of: `cells` are rates, `pairs`, `confusion`, ...; beside each is the same as
-    Parquet, where the package pyarrow is installed."""
+    """As CSV: `conditions` has the rates, `pairs`, `confusion`, ...; with the package pyarrow also as Parquet."""
     figures: tuple[Path, ...]
-    """All, as SVG, and as PNG where people put them into text."""
-    cells: tuple[Cell, ...]
+    """As SVG, some also as PNG."""
+    conditions: tuple[ConditionResult, ...]
     confusions: Sequence[Line]
     pictures: int
     """Failures that were drawn."""
@@ -82,17 +81,17 @@ def report(
     trust_code: bool = False,
     draw: Draw | None = None,
 ) -> Report:
-    """Write the page, tables and figures beside the rows of a sweep.
+    """Write the page, tables and figures into the folder of a sweep.
 
     Args:
-        pictures: So many failures are drawn at most; most are run again for it, which takes as long as it took.
-        salt_file: Of trials that were drawn with a salt; without it none of them is run again.
+        pictures: At most this many failures are drawn; most of these trials run again.
+        secret_seed_file: Of trials drawn with a secret seed; without it none of them runs again.
         trust_code: Run also trials that name code that does not come with the package. Without it nothing that a file
             of the folder names is imported.
-        draw: What draws failures; without it there is no picture.
+        draw: Draws failures; without it there is no picture.
 
     Raises:
-        InputError: No rows there, another salt, or the folder cannot be written.
+        InputError: No records there, another secret seed, or the folder cannot be written.
     """
     folder = Path(folder)
     trials = read_trials(folder)
@@ -102,7 +101,8 @@ def report(
         check_same_secret_seed(f"'{folder}'", secret_seed.hash, trials.find_secret_seed())
     numbers = summary(trials)
     require(
-        numbers.cells, f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
+        numbers.results,
+        f"'{folder}' holds only replays of observations from files, which belong to no condition of a sweep.",
     )
     try:
         check_target(folder / PAGE)
@@ -118,25 +118,25 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
     run = read_run(folder)
     timing = read_timing(folder)
     tables = {
-        "cells": cell_table(numbers.cells),
+        "conditions": condition_table(numbers.results),
         "pairs": pair_table(numbers.pairs),
         "half_levels": half_table(numbers.half_levels),
         "gaps": gap_table(gaps(trials)),
         "confusion": confusion_table(confusions(trials)),
-        "detected": recognition_table(recognitions(trials)),
+        "detected": detection_table(detections(trials)),
         "calibration": calibration_table(calibrations(trials)),
-        "felt": felt_table(felt(trials)),
+        "probing": probing_table(probing_results(trials)),
         "effort": effort_table(efforts(trials)),
         "times": time_table(trial_times(timing)),
         "work": work_table(work(timing)),
     }
     lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))
-    drawn = figures(numbers.cells, numbers.pairs, settings(numbers.cells), *lines)
+    drawn = figures(numbers.results, numbers.pairs, settings(numbers.results), *lines)
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
     kept = [path for paths in written.values() for path in paths]
     if has_parquet():
-        kept.append(_write_rows(trials, folder / TABLES / "rows.parquet"))
+        kept.append(_write_rows(trials, folder / TABLES / "records.parquet"))
     paths = [figure.write(folder / FIGURES / f"{name}.svg") for name, figure in drawn.items()]
     small = [name for name in PNG if name in drawn and drawn[name].panels <= MOST_PANELS]
     paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
@@ -147,7 +147,7 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
             name=folder.resolve().name,
             answer=sentences,
             trials=trials,
-            cells=numbers.cells,
+            results=numbers.results,
             figures=drawn,
             tables=tables,
             run=run,
@@ -161,7 +161,7 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
     csv = {name: paths[0] for name, paths in written.items()}
     confused = tables["confusion"].items
     return Report(
-        folder / PAGE, sentences, csv, tuple(paths), numbers.cells, confused, len(pictures), tuple(no_pictures)
+        folder / PAGE, sentences, csv, tuple(paths), numbers.results, confused, len(pictures), tuple(no_pictures)
     )
 
 

@@ -1,11 +1,11 @@
-"""How a trial ended, in a few words, and which numbers of it people are shown."""
+"""Words and numbers of a trial for a page."""
 
 from collections.abc import Mapping
 from typing import Any
 
 NUMBERS: Mapping[str, str] = {
-    "gap_before_mm": "gap as seen [mm]",
-    "gap_after_mm": "gap as planned [mm]",
+    "gap_before_mm": "gap observed [mm]",
+    "gap_after_mm": "gap planned [mm]",
     "worst_gap_mm": "gap reached [mm]",
     "worst_angle_deg": "angle reached [deg]",
     "least_overlap": "least overlap",
@@ -16,7 +16,7 @@ NUMBERS: Mapping[str, str] = {
     "pose_error_fixed_mm": "reached error, fixed [mm]",
     "pose_error_free_mm": "reached error, free [mm]",
     "p_value": "p of the test",
-    "predicted_success": "predicted_success",
+    "predicted_success": "predicted success",
     "extra_operations": "extra operations",
     "peak_force_n": "peak force [N]",
     "sim_time_s": "simulated [s]",
@@ -42,7 +42,7 @@ def why(row: Mapping[str, Any]) -> str:
 
 
 def predicted(row: Mapping[str, Any]) -> str:
-    """What the plan said beforehand."""
+    """The prediction of the plan."""
     if row["predicted_fails"] is None:
         return ""
     return (

@@ -86,7 +86,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         )
         require(
             self.brier is None or (self.predicted_success is not None and self.executed > 0),
-            "a Brier score is stated, and no plan that promised anything was carried out",
+            "a Brier score is stated, and no plan with a predicted success was executed",
         )
 
     @property

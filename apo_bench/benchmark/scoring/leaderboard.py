@@ -17,22 +17,18 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, default_looks, grouped, save_figure, write_file
 
 _PROVES = (
-    "`self-reported` proves nothing: public seeds can be drawn again by whoever has the package. `verified` entries "
-    "were run by whoever wrote this table, with trials drawn by a salt whose hash was published before; entrants that "
-    "are not trusted ran as programs, which are given observations and nothing else. Entries marked `quick` ran a few "
-    "trials, which are no score."
+    "`self-reported` proves nothing: anyone with the package can draw public seeds again. The author of this table ran "
+    "`verified` entries with trials of a secret seed, whose hash was published before; entrants that are not trusted "
+    "ran as programs, which get observations and nothing else. Entries marked `quick` ran a few trials, which are no "
+    "score."
 )
 _EVERY = (
-    "Success rate in percent, mean over the cells of a track, with its 95 % interval over seeds; in brackets that of "
-    "the plans that were carried out, where some were not."
+    "Success rate in percent, mean over the conditions of a track, with its 95 % interval over seeds; in brackets the "
+    "rate of the plans that were executed, where some were not."
 )
-_SQUARE_IN = (0.72, 0.42)
-_MARGIN_IN = (2.2, 1.1)
 _MOST_SQUARES = 50
 """Entries, or tracks, that the figure shows; the tables have all."""
-_USUAL_LABEL, _LONGEST_LABEL = 20, 40
-"""Characters of a name in the figure: the margins have room for the first number, and grow up to the second."""
-_LETTER_IN = 0.08
+_LONGEST_LABEL = 30
 
 
 class Line(NamedTuple):
@@ -47,15 +43,23 @@ class Line(NamedTuple):
         return ("verified" if self.verified else "self-reported") + ", quick" * self.entry.quick
 
 
-def ranked(entries: Sequence[Entry], salts: frozenset[str] = frozenset()) -> list[Line]:
+class Run(NamedTuple):
+    """An entry in one of its tracks."""
+
+    entry: Entry
+    name: str
+    track: TrackScore
+
+
+def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset()) -> list[Line]:
     """Entries with the best first: those that entered more of the tracks that count stand before others.
 
     Args:
-        salts: Hashes of salts that trials were drawn with by whoever writes the table.
+        secret_seeds: Hashes of the secret seeds with which the author of the table drew trials.
     """
     count = {id(e): sum(track.overall for track in e.tracks.values()) for e in entries}
     order = sorted(entries, key=lambda e: (-count[id(e)], -(e.overall or (0.0,))[0], e.name))
-    return [Line(i, entry, _is_verified(entry, salts)) for i, entry in enumerate(order, start=1)]
+    return [Line(i, entry, _is_verified(entry, secret_seeds)) for i, entry in enumerate(order, start=1)]
 
 
 @check_arguments
@@ -92,7 +96,7 @@ def read_entries(folder: str | Path) -> tuple[list[Entry], list[str]]:
     return entries, left_out
 
 
-def write_leaderboard(entries: Sequence[Entry], out: str | Path, salts: frozenset[str] = frozenset()) -> None:
+def write_leaderboard(entries: Sequence[Entry], out: str | Path, secret_seeds: frozenset[str] = frozenset()) -> None:
     """Write the page, in Markdown, and its figure next to it.
 
     Args:
@@ -102,7 +106,7 @@ def write_leaderboard(entries: Sequence[Entry], out: str | Path, salts: frozense
         InputError: The figure cannot be written.
     """
     tracks = _tracks(entries)
-    lines = ranked(entries, salts)
+    lines = ranked(entries, secret_seeds)
     out = Path(out)
     picture = out.with_suffix(".png")
     check_target(out)
@@ -116,7 +120,7 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             Column("place", "#"),
-            Column("name", "entry", lambda line: line.entry.name, words=True),
+            Column("name", "entry", "entry.name", words=True),
             Column("score", "score", lambda line: _overall(line.entry)),
             Column("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
             Column("status", "status", words=True),
@@ -124,32 +128,18 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
     )
 
 
-_Version = tuple[str, bool]
-"""Hash of a track's file, and whether the track counts in the score over all."""
-
-
-def _version(track: TrackScore) -> _Version:
+def _version(track: TrackScore) -> tuple[str, bool]:
+    """Hash of a track's file, and whether the track counts in the score over all."""
     return track.track, track.overall
 
 
-def _used_versions(entries: Sequence[Entry]) -> dict[str, _Version]:
-    """The version of each track that most entries are of; of equally many that of the package, else the first."""
+def _used_versions(entries: Sequence[Entry]) -> dict[str, tuple[str, bool]]:
+    """The version of each track that most entries have; of equally many that of the package, else the first."""
     stated = grouped((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
-    used = {}
-    for name, versions in stated.items():
-        count = Counter(versions)
-        most = [version for version in count if count[version] == max(count.values())]
-        own = _own_version(name) if len(most) > 1 else None
-        used[name] = own if own in most else most[0]
-    return used
-
-
-def _own_version(name: str) -> _Version | None:
-    """That of a track that comes with the package."""
-    if name not in track_names():
-        return None
-    track = read_track(name)
-    return track.hash, track.overall
+    for name in set(stated) & set(track_names()):
+        own = read_track(name)
+        stated[name].sort(key=lambda version: version != (own.hash, own.overall))
+    return {name: Counter(versions).most_common(1)[0][0] for name, versions in stated.items()}
 
 
 def _tracks(entries: Sequence[Entry]) -> list[str]:
@@ -159,52 +149,37 @@ def _tracks(entries: Sequence[Entry]) -> list[str]:
 
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
+    runs = [Run(line.entry, name, line.entry.tracks[name]) for line in lines for name in line.entry.tracks]
+    entry = Column("name", "entry", "entry.name", words=True)
+    track = Column("track", "track", "name", words=True)
+    every = (entry, *(Column(name, name, partial(_score_words, name)) for name in tracks))
+    predicting = (
+        *(entry, track, Column("predicted_success", "predicted success", text="{track.predicted_success:percent}")),
+        Column("score", "score", text="{track.score:.1f}"),
+        Column("brier", "Brier score", text="{track.brier:.3f}"),
+    )
+    hashes = (
+        *(entry, track, Column("trials", "trials", "track.trials")),
+        Column("file", "track file", "track.track", words=True),
+        Column("code", "code", "track.code", words=True),
+        Column("rows", "records", "track.rows", words=True),
+    )
+    machines = (
+        *(entry, Column("command", "command", "entry.command", words=True)),
+        Column("versions", "versions", _versions_text, words=True),
+        Column("machine", "machine", "entry.machine", words=True),
+    )
     yield from ("# Leaderboard", "", "Written by `apo-bench leaderboard`.", "", _PROVES, "")
     yield from leaderboard_table(lines).markdown()
-    yield from ("", f"![Scores of entries in tracks]({picture})", "", "## Every track", "")
-    yield from (_EVERY, "")
-    columns = [Column(name, name, partial(_cell_in, name)) for name in tracks]
-    yield from Table(lines, (Column("name", "entry", lambda line: line.entry.name, words=True), *columns)).markdown()
-    yield from ("", "## Promises", "")
-    promising = [(line.entry, name) for line in lines for name in tracks if _promises(line.entry.tracks.get(name))]
-    yield from Table(
-        promising,
-        (
-            Column("entry", "entry", lambda pair: pair[0].name, words=True),
-            Column("track", "track", lambda pair: pair[1], words=True),
-            Column(
-                "predicted_success",
-                "predicted_success",
-                lambda pair: _percent(pair[0].tracks[pair[1]].predicted_success),
-            ),
-            Column("score", "score", lambda pair: f"{pair[0].tracks[pair[1]].score:.1f}"),
-            Column("brier", "Brier score", lambda pair: f"{pair[0].tracks[pair[1]].brier:.3f}"),
-        ),
-        "No entry promises anything.",
-    ).markdown()
-    yield from ("", "## What was run", "")
-    runs = [(line.entry, name, track) for line in lines for name, track in line.entry.tracks.items()]
-    yield from Table(
-        runs,
-        (
-            Column("entry", "entry", lambda run: run[0].name, words=True),
-            Column("track", "track", lambda run: run[1], words=True),
-            Column("trials", "trials", lambda run: run[2].trials),
-            Column("file", "track file", lambda run: run[2].track, words=True),
-            Column("code", "code", lambda run: run[2].code, words=True),
-            Column("rows", "rows", lambda run: run[2].rows, words=True),
-        ),
-    ).markdown()
+    yield from ("", f"![Scores of entries in tracks]({picture})", "", "## Every track", "", _EVERY, "")
+    yield from Table(lines, every).markdown()
+    yield from ("", "## Predicted success", "")
+    brier = [run for run in runs if run.track.brier is not None]
+    yield from Table(brier, predicting, "No entry predicts success.").markdown()
+    yield from ("", "## Runs", "")
+    yield from Table(runs, hashes).markdown()
     yield ""
-    yield from Table(
-        [line.entry for line in lines],
-        (
-            Column("name", "entry", words=True),
-            Column("command", "command", words=True),
-            Column("versions", "versions", _versions_text, words=True),
-            Column("machine", "machine", words=True),
-        ),
-    ).markdown()
+    yield from Table(lines, machines).markdown()
 
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
@@ -213,45 +188,38 @@ def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
         from matplotlib.figure import Figure
 
-        names, methods = list(map(_label, tracks)), [_label(line.entry.name) for line in lines]
-        more = _LETTER_IN * max(0, max(map(len, (*names, *methods))) - _USUAL_LABEL)
-        width, height = (
-            n * step + margin + more
-            for n, step, margin in zip((len(tracks), len(lines)), _SQUARE_IN, _MARGIN_IN, strict=True)
-        )
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = Figure(figsize=(0.72 * len(tracks) + 3.0, 0.42 * len(lines) + 2.0), layout="constrained")
         axes = figure.subplots()
         scores = [[_score(line.entry.tracks.get(name)) for name in tracks] for line in lines]
-        filled = np.array(scores, dtype=float)  # what was not entered is nan
-        shown = axes.imshow(filled, vmin=0.0, vmax=100.0, cmap="Blues", aspect="auto")
+        shown = axes.imshow(np.array(scores, dtype=float), vmin=0.0, vmax=100.0, cmap="Blues", aspect="auto")
         for y, row in enumerate(scores):
             for x, value in enumerate(row):
                 if value is not None:
                     axes.text(x, y, f"{value:.0f}", ha="center", va="center", color="white" if value > 60 else "black")
-        axes.set_xticks(range(len(tracks)), names, rotation=35, ha="right")
-        axes.set_yticks(range(len(lines)), methods)
+        axes.set_xticks(range(len(tracks)), list(map(_shorten, tracks)), rotation=35, ha="right")
+        axes.set_yticks(range(len(lines)), [_shorten(line.entry.name) for line in lines])
         figure.colorbar(shown, label="success [%]", shrink=0.8)
         save_figure(figure, out, dpi=110)
 
 
-def _label(name: str) -> str:
+def _shorten(name: str) -> str:
     return name if len(name) <= _LONGEST_LABEL else f"{name[: _LONGEST_LABEL - 1]}…"
 
 
-def _is_verified(entry: Entry, salts: frozenset[str]) -> bool:
-    return all(track.secret_seed in salts for track in entry.tracks.values())
+def _is_verified(entry: Entry, secret_seeds: frozenset[str]) -> bool:
+    return all(track.secret_seed in secret_seeds for track in entry.tracks.values())
 
 
 def _overall(entry: Entry) -> str | None:
     return None if (o := entry.overall) is None else f"{o[0]:.1f} ({o[1]:.1f} to {o[2]:.1f})"
 
 
-def _cell_in(name: str, line: Line) -> str | None:
-    """What an entry scored in a track, as text."""
+def _score_words(name: str, line: Line) -> str | None:
+    """The score of an entry in a track, as text."""
     if (track := line.entry.tracks.get(name)) is None:
         return None
-    carried = track.when_executed
-    less = f" [{carried:.1f}]" if track.executed < track.trials and carried is not None else ""
+    executed = track.when_executed
+    less = f" [{executed:.1f}]" if track.executed < track.trials and executed is not None else ""
     return f"{track.score:.1f} ({track.low:.0f} to {track.high:.0f}){less}"
 
 
@@ -259,13 +227,5 @@ def _score(track: TrackScore | None) -> float | None:
     return None if track is None else track.score
 
 
-def _promises(track: TrackScore | None) -> bool:
-    return track is not None and track.brier is not None
-
-
-def _percent(share: float | None) -> str | None:
-    return None if share is None else f"{100.0 * share:.1f}"
-
-
-def _versions_text(entry: Entry) -> str:
-    return ", ".join(f"{name} {version}" for name, version in entry.versions.items())
+def _versions_text(line: Line) -> str:
+    return ", ".join(f"{name} {version}" for name, version in line.entry.versions.items())

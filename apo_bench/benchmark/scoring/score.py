@@ -2,25 +2,27 @@
 
 import hashlib
 import json
-import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
-from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.analysis import NOT_EXECUTED, PLACE_FIELDS, place_of
+from apo_bench.benchmark.analysis import CONDITION_FIELDS
+from apo_bench.benchmark.analysis.rates import brier_score, mean, was_executed
 from apo_bench.benchmark.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.benchmark.scoring.track import Track
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.io import brief, clean, grouped
 from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.trials import trials_of
 
 _HEX = 16
-_CELL = tuple(name for name in PLACE_FIELDS if name != "method")
+_SPELLED = tuple(name for name in CONDITION_FIELDS if name != "method")
 
 
 @check_arguments
@@ -42,10 +44,10 @@ def score(
         rows: The folder of the rows, one folder below it for each track and arm; continued if it holds rows of the
             same trials.
         name: What tables call it; None for the method's.
-        quick: A few seeds of each cell, to see whether it works.
+        quick: A few seeds of each condition, to check that it works.
         command: What to note as the command line.
         said: Called with each track before it runs.
-        how: As for `run_sweep`: `workers`, `backend`, `salt_file`.
+        how: As for `run_sweep`: `workers`, `backend`, `secret_seed_file`.
 
     Raises:
         InputError, RuntimeError, KeyboardInterrupt: As `run_sweep`; what had ended is kept.
@@ -58,14 +60,14 @@ def score(
     versions: Mapping[str, str] = {}
     for track in tracks:
         said(track)
-        runs = {}
+        records: list[TrialRecord] = []
         for arm in track.arms:
             folder = Path(rows) / track.name / Path(arm).stem.replace(":", "_")
             folder.parent.mkdir(parents=True, exist_ok=True)
-            runs[arm] = run_sweep(track.of(method, arm, quick), folder, command=command, **how)
+            records += run_sweep(track.of(method, arm, quick), folder, command=command, **how)
             run = read_run(folder)
             versions = {"python": run["python"], **run["versions"]}
-        scores[track.name] = _scored(track, runs, run)
+        scores[track.name] = _score_track(track, records, run)
     return Entry(
         schema=SCHEMA,
         name=name,
@@ -78,15 +80,12 @@ def score(
     )
 
 
-def _scored(track: Track, runs: Mapping[str, Sequence[TrialRecord]], run: Mapping[str, Any]) -> TrackScore:
-    """What the rows of a track say, of all of its arms."""
-    rows = [row for own in runs.values() for row in own]
-    counted = [row for row in rows if row["success"] is not None]
-    promises = [(p, row) for row in counted if (p := row.get("predicted_success")) is not None]
-    carried = [row for row in counted if row["failure_stage"] not in NOT_EXECUTED]
-    errors = [(p - bool(row["success"])) ** 2 for p, row in promises if row["failure_stage"] not in NOT_EXECUTED]
-    cells = _cells(rows)
-    value, low, high = score_of(cells)
+def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str, Any]) -> TrackScore:
+    """The score of a track from the records on all of its arms."""
+    trials = trials_of(records)
+    counted = trials.where(~np.isnan(trials.number("success")))
+    conditions = _spell_conditions(records)
+    value, low, high = score_of(conditions)
     return TrackScore(
         track=track.hash,
         overall=track.overall,
@@ -94,33 +93,27 @@ def _scored(track: Track, runs: Mapping[str, Sequence[TrialRecord]], run: Mappin
         low=low,
         high=high,
         trials=len(counted),
-        executed=len(carried),
-        predicted_success=_mean([p for p, _ in promises]),
-        brier=_mean(errors),
-        rows=_digest(sorted(json.dumps(row, sort_keys=True) for row in rows)),
+        executed=int(was_executed(counted).sum()),
+        predicted_success=mean(counted.number("predicted_success")),
+        brier=brier_score(counted),
+        rows=_digest(sorted(json.dumps(record, sort_keys=True) for record in records)),
         code=_digest([json.dumps({key: run[key] for key in ("versions", "content")}, sort_keys=True)]),
         secret_seed=run.get("secret_seed"),
-        cells=cells,
+        cells=conditions,
     )
 
 
-def _cells(rows: Iterable[TrialRecord]) -> dict[str, str]:
-    """Settings of a cell -> how its trials ended, the first seed first."""
-    cells = grouped((_cell(row), row) for row in rows)
-    spell = partial(map, lambda row: EXCLUDED if row["success"] is None else (WRONG, RIGHT)[row["success"]])
-    return {key: "".join(spell(sorted(cells[key], key=lambda row: row["seed"]))) for key in sorted(cells)}
-
-
-def _cell(row: TrialRecord) -> str:
-    """What the trials of a cell have in common, but for the method."""
-    place = place_of(row)
-    assert place is not None  # trials of a sweep have a level
-    return "|".join([row["arm"], *(f"{asdict(place)[name]}" for name in _CELL)])
+def _spell_conditions(records: Iterable[TrialRecord]) -> dict[str, str]:
+    """Settings of a condition -> its trials, one character each, the first seed first."""
+    spelled = {True: RIGHT, False: WRONG, None: EXCLUDED}
+    conditions = grouped(
+        ("|".join([record["arm"], *(str(record.get(name)) for name in _SPELLED)]), record) for record in records
+    )
+    return {
+        key: "".join(spelled[record["success"]] for record in sorted(conditions[key], key=itemgetter("seed")))
+        for key in sorted(conditions)
+    }
 
 
 def _digest(lines: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:_HEX]
-
-
-def _mean(numbers: Sequence[float]) -> float | None:
-    return math.fsum(numbers) / len(numbers) if numbers else None  # in whatever order trials ended

@@ -7,7 +7,7 @@ from itertools import product
 from numbers import Integral, Real
 from typing import Any, final
 
-from apo_bench.errors import require, require_text
+from apo_bench.errors import require
 from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -16,15 +16,14 @@ from apo_bench.records import (
     SecretSeed,
     SettingInfo,
     TrialConfig,
+    affects,
     check,
     check_grip,
     check_together,
     knows_truth,
-    may_reobserve,
     noise_pair,
     probes,
     refuse_noise,
-    uses_contacts,
 )
 from apo_bench.scenario import Scenario, load_scenario
 
@@ -36,13 +35,6 @@ _MAY_BE_EMPTY = ("clearance_mm", "noise")
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """The settings that all trials of a sweep share."""
 _VARIED = tuple(info for info in AXES if info.name not in ("scenario", "clearance_mm"))
-_MET_BY_SOME = {
-    "contact_source": uses_contacts,
-    "max_reobservations": may_reobserve,
-    "ft_sensor": probes,
-    "assumed_robot_error": probes,
-}
-"""Setting -> whether it affects a method."""
 Batch = tuple[TrialConfig, ...]
 """Trials that share layout and demonstration."""
 
@@ -94,43 +86,30 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
             object.__setattr__(self, "noise_deg", ())
         for info in AXES:
             given = _several(getattr(self, info.name))
-            entries = given if info.is_whole else tuple(map(_plain, given))
+            entries = given if info.is_whole else map(_plain, given)
             values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
             require(
                 values or info.name in _MAY_BE_EMPTY,
                 f"no {info.words} was given for the sweep; at least one is needed.",
             )
             object.__setattr__(self, info.name, values)
+            for value in () if info is NOISE_LEVEL else values:
+                info.check(value)
+        for name in SHARED:
+            check(name, getattr(self, name))
         require(
             isinstance(self.trials, Integral) and 1 <= self.trials <= MOST_TRIALS,
-            f"{self.trials} trials were given; a whole number from 1 to {MOST_TRIALS} is allowed.",
+            f"trials must be a whole number from 1 to {MOST_TRIALS}, got {self.trials}.",
         )
         object.__setattr__(self, "trials", int(self.trials))
         check("seed", self.seed)
         check("seed", self.seed + self.trials - 1)
-        for source in self.pose_source:
-            check("pose_source", source)
-        drawn = set(self.pose_source) != {DEPTH_CAMERA}
-        if self.noise and not drawn:
+        if set(self.pose_source) == {DEPTH_CAMERA}:
             refuse_noise(*self.noise)
-        object.__setattr__(self, "noise", self.noise or (TrialConfig.noise,) * drawn)
+        else:
+            object.__setattr__(self, "noise", self.noise or (TrialConfig.noise,))
         for level, source in product(self.noise_level, self.pose_source):
-            if isinstance(level, tuple):
-                noise_pair(level, source)
-            else:
-                check("noise_mm", level, source, "noise level")
-        for name, values in (
-            {name: getattr(self, name) for name, info in SETTINGS.items() if info.axis}
-            | {name: (getattr(self, name),) for name in SHARED}
-        ).items():
-            for value in values:
-                check(name, value)
-                if SETTINGS[name].is_text:
-                    require_text(SETTINGS[name].words, value)
-                require(
-                    not SETTINGS[name].is_text or name == "scenario" or not UNSHOWN.search(value),
-                    f"the name {value!r} was given, which has control characters or half letters; use another one.",
-                )
+            noise_pair(level, source)
         check_together(self.fidelity, *self.grasp)
         check_grip(any(map(probes, self.method)), *self.grasp)
 
@@ -140,13 +119,21 @@ def _several(values: Any) -> tuple[Any, ...]:
     return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
 
 
+def _plain(value: Any) -> Any:
+    """Numbers as records have them, whatever their type: 2.0 for 2, and 0.0 for -0.0."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value) + 0.0
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(map(_plain, value))
+    return value
+
+
 def check_grids(grids: Sequence[SweepConfig]) -> None:
-    """Raise an `InputError` unless there is a grid, all have the same arm, time step and fidelity, and they are not
-    larger than can be held."""
+    """Raise an `InputError` unless there is a grid, all share arm, time step and fidelity, and memory can hold them."""
     require(grids, "no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
-        require(len(values) <= 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
+        require(len(values) == 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
     most = sum(grid.trials * math.prod(max(1, len(getattr(grid, info.name))) for info in AXES) for grid in grids)
     require(
         most <= MOST_TRIALS,
@@ -156,7 +143,7 @@ def check_grids(grids: Sequence[SweepConfig]) -> None:
 
 
 def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
-    """Every scenario of a sweep by what was given for it.
+    """Every scenario of a sweep, name or path -> scenario.
 
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
@@ -178,22 +165,29 @@ def load_all(grids: Sequence[SweepConfig]) -> Mapping[str, Scenario]:
 def units(
     grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario], secret_seed: SecretSeed | None = None
 ) -> Iterator[Batch]:
-    """All trials of a sweep, each once, ordered by seed, so that every condition of an interrupted sweep has about as
-    many.
+    """All trials of a sweep, each once, ordered by seed, so that an interrupted sweep has about as many of each
+    condition; the trials of one batch share layout and demonstration.
 
     Noise and human error do not affect the oracle: it runs once per seed, grasp and robot error, recorded with noise
-    level 0, human error scale 0 and the first noise model or pose source. Methods without a corrector are recorded with
-    the contact source `given`, those that do not reobserve with 0 reobservations, those without `+probe` with the
-    default sensor and assumed robot error.
+    level 0, human error scale 0 and the first noise model or pose source. Other settings that do not affect a method
+    are recorded for it as their defaults.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
         for source, scenario in loaded.items():
-            yield from _units(those, source, scenario, seed, secret_seed)
+            same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
+            together = grouped(
+                ((trial.clearance_mm, trial.human_error_scale, trial.pose_source), trial)
+                for grid in those
+                if source in grid.scenario
+                for clearance_mm in grid.clearance_mm or (scenario.clearance_mm,)
+                for trial in _trials(grid, same | {"clearance_mm": clearance_mm})
+            )
+            yield from (tuple(dict.fromkeys(trials)) for trials in together.values())
 
 
-def described(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
-    """The grids as they stand in `run.json`, with scenarios by name and clearances filled in."""
+def describe_grids(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
+    """The grids as `run.json` has them, with scenarios by name and clearances filled in."""
     forms = []
     for grid in grids:
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
@@ -203,55 +197,18 @@ def described(grids: Sequence[SweepConfig], loaded: Mapping[str, Scenario]) -> l
     return forms
 
 
-def _units(
-    grids: Sequence[SweepConfig], source: str, scenario: Scenario, seed: int, secret_seed: SecretSeed | None
-) -> Iterator[Batch]:
-    """The trials of a scenario and a seed, by what they share."""
-    together = grouped(
-        ((clearance, trial.human_error_scale, trial.pose_source), trial)
-        for grid in grids
-        if source in grid.scenario
-        for clearance in grid.clearance_mm or (scenario.clearance_mm,)
-        for trial in _trials(grid, source, clearance, seed, secret_seed)
-    )
-    return (tuple(dict.fromkeys(trials)) for trials in together.values())
-
-
-def _trials(
-    grid: SweepConfig, source: str, clearance_mm: float, seed: int, secret_seed: SecretSeed | None
-) -> Iterator[TrialConfig]:
-    """Every combination of a grid as what its method meets of it; some are the same."""
-    same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
-    same |= {"scenario": source, "clearance_mm": clearance_mm, "seed": seed, "secret_seed": secret_seed}
-    values = [getattr(grid, info.name) or (DEPTH_CAMERA,) for info in _VARIED]
-    for combination in product(*values):
-        asked = dict(zip((info.name for info in _VARIED), combination, strict=True))
-        yield TrialConfig(**same, **_met(asked, grid))
-
-
-def _met(asked: dict[str, Any], grid: SweepConfig) -> dict[str, Any]:
-    """The settings that affect a method, with defaults in place of the others."""
-    method = asked["method"]
-    if knows_truth(method):
-        asked |= {
-            "noise_level": 0.0,
-            "human_error_scale": 0.0,
-            "pose_source": grid.pose_source[0],
-            "noise": grid.noise[0] if grid.noise else DEPTH_CAMERA,
-        }
-    if asked["pose_source"] == DEPTH_CAMERA:
-        asked["noise"] = DEPTH_CAMERA
-    for name, is_met in _MET_BY_SOME.items():
-        if not is_met(method):
-            asked[name] = SETTINGS[name].default
-    asked["noise_mm"], asked["noise_deg"] = noise_pair(asked.pop("noise_level"), asked["pose_source"])
-    return asked
-
-
-def _plain(value: Any) -> Any:
-    """Numbers as records have them, whatever their type: 2.0 for 2, and 0.0 for -0.0."""
-    if isinstance(value, Real) and not isinstance(value, bool):
-        return float(value) + 0.0
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return tuple(map(_plain, value))
-    return value
+def _trials(grid: SweepConfig, same: Mapping[str, Any]) -> Iterator[TrialConfig]:
+    """Every combination of a grid, with defaults in place of settings that do not affect the method."""
+    shared = {name: getattr(grid, name) for name in SHARED}
+    names = [info.name for info in _VARIED]
+    for combination in product(*(getattr(grid, name) or (DEPTH_CAMERA,) for name in names)):
+        values = dict(zip(names, combination, strict=True))
+        method = values["method"]
+        values |= {name: SETTINGS[name].default for name in names if not affects(name, method)}
+        if knows_truth(method):
+            first = {"pose_source": grid.pose_source[0], "noise": (*grid.noise, DEPTH_CAMERA)[0]}
+            values |= {"noise_level": 0.0, "human_error_scale": 0.0, **first}
+        if values["pose_source"] == DEPTH_CAMERA:
+            values["noise"] = DEPTH_CAMERA
+        mm, deg = noise_pair(values.pop("noise_level"), values["pose_source"])
+        yield TrialConfig(**same, **shared, **values, noise_mm=mm, noise_deg=deg)

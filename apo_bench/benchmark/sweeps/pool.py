@@ -19,7 +19,7 @@ from typing import Any
 from pebble import ProcessExpired, ProcessPool
 
 from apo_bench.benchmark.sweeps.grid import Batch
-from apo_bench.benchmark.sweeps.stopping import stoppable
+from apo_bench.benchmark.sweeps.stopping import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
 from apo_bench.errors import require
 from apo_bench.io import SAFE_PATH, environment
@@ -118,7 +118,7 @@ def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
     """
     scenario, settings = checked_request(request)
     check_limit(limit_s)
-    with stoppable(), process_pool(1) as pool:
+    with stop_at_signals(), process_pool(1) as pool:
         try:
             row: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
             return row

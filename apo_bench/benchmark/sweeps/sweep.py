@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, described, load_all, units
+from apo_bench.benchmark.sweeps.grid import Batch, SweepConfig, check_grids, describe_grids, load_all, units
 from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
 from apo_bench.benchmark.sweeps.progress import progress
-from apo_bench.benchmark.sweeps.stopping import stoppable
+from apo_bench.benchmark.sweeps.stopping import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
 from apo_bench.correction.correctors import checked_corrector
 from apo_bench.errors import require, require_known
@@ -92,7 +92,7 @@ def run_sweep(
     secret_seed = None if secret_seed_file is None else secret_seed_of_sweep(secret_seed_file, out)
     here = workers is None and backend == "local"
     run = run_record(
-        described(grids, loaded),
+        describe_grids(grids, loaded),
         _content(grids, loaded, arm.files),
         inputs.versions,
         {loaded[source].name: source for source in loaded if not is_named(source)},
@@ -101,7 +101,7 @@ def run_sweep(
         Limits(None if here else limit_s),
         git_revision(),
     )
-    with stoppable(), RunFolder(Path(out), run) as store:
+    with stop_at_signals(), RunFolder(Path(out), run) as store:
         batches = list(_left(units(grids, loaded, secret_seed), loaded, inputs, store))
         with progress(sum(map(len, batches))) as count:
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.importers.cad.solids.naming import part_name, title_of
+from apo_bench.importers.cad.solids.naming import clean_title, part_name
 from apo_bench.importers.cad.solids.raw_solid import SolidPlace
 from apo_bench.io import write_file
 
@@ -34,7 +34,7 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
     for part, name, place in places:
         packed = pose.pack(place.T)
         lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
-        lines += [f"title = {json.dumps(title_of(place.name), ensure_ascii=False)}"] * (name != place.name)
+        lines += [f"title = {json.dumps(clean_title(place.name), ensure_ascii=False)}"] * (name != place.name)
         lines.append(f"at_mm = {_list(packed[:3])}")
         lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
         if place.color is not None:

@@ -13,7 +13,6 @@ from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, Ti
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution import key_angles, moves
 from apo_bench.simulation.robot import (
     ExecutionAborted,
@@ -26,13 +25,13 @@ from apo_bench.simulation.robot import (
 from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
-_TABLE_M = 0.03
-_TURNS = (-1.2, 0.0, 1.2)
-"""Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
-_PUSH_N = 5.0
-_PUSH_S = 0.5
-"""Stiffness is looked at by this push, which lasts so long."""
+_TABLE_M = 0.03  # height of the tip over the table
+_TURNS = (-1.2, 0.0, 1.2)  # turns about the vertical from home, [rad], at which the table is to be reached
+_PUSH_N = 5.0  # stiffness is measured by this push
+_PUSH_S = 0.5  # which lasts so long
 _LAYOUTS = 20
+_LEAST_FORCE_N = 10.0
+"""Of each pad: below it parts slip."""
 _LEAST_MARGIN_DEG = 5.0
 
 
@@ -90,8 +89,8 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; "
             "give its motors more 'armature' in the MJCF, so that its servos get stiffer, or make the clearance larger."
         )
-    if force < LEAST_FORCE_N:
-        missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
+    if force < _LEAST_FORCE_N:
+        missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {_LEAST_FORCE_N:g} N.")
     if len(in_reach) < layouts:
         missing.append(
             f"{layouts - len(in_reach)} of {layouts} layouts are not reached; move 'base' nearer, or state another "

@@ -27,9 +27,8 @@ WAY_M = 0.15
 """Length of the way along which they are looked at."""
 STAND_S = 0.3
 """How long the arm stands before it."""
-_RESTS_M = 2e-5
-_LOOKS = 10
-"""It stands so much longer, as often as this, until the tip is at its command: weak joints swing behind."""
+_RESTS_M = 2e-5  # the tip rests when it is this near to its command
+_LOOKS = 10  # the arm waits for that so often: weak joints swing behind
 
 
 @final

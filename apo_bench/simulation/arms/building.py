@@ -1,4 +1,4 @@
-"""Build an `Arm` from its description: put its model together, drive its joints, measure its gripper."""
+"""Build an `Arm` from its description: put its model together, drive its joints, mount its gripper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,35 +7,30 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from msgspec import structs
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import named_files
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
+from apo_bench.simulation.arms.description import ArmDescription, read_description
+from apo_bench.simulation.arms.gripper_file import read_gripper
 from apo_bench.simulation.arms.grooves import fill_grooves
+from apo_bench.simulation.arms.hands import check_names, find_pad, scale_drive
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import compile_model, load_model
-from apo_bench.simulation.arms.measuring import Measured, measure
-from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
-from apo_bench.simulation.arms.stated import speed_limits, stated_arm
-from apo_bench.simulation.arms.strength import with_force
-from apo_bench.simulation.physics import without_log_file
+from apo_bench.simulation.arms.stated import model_files, speed_limits, stated_arm
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
-_FINGER_ARMATURE = 1e-4
-_FINGER_DAMPING = 0.02
-"""Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
-_COUPLED_SOLREF = (0.004, 1.0)
-_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)
-_UNSAID_SOLREF = (0.02, 1.0)
-"""Fingers that are coupled as softly as MuJoCo has it by default give way by 1 mm to some newtons; they get
-the first two, which the grippers that come with the benchmark have."""
+_FINGER_ARMATURE = (
+    1e-4  # [kg m^2], of finger joints that are neither damped nor geared: light links would rattle for ever
+)
+_FINGER_DAMPING = 0.02  # [Nm s/rad], of the same
+_COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
+_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
+_UNSAID_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they give way by 1 mm to some newtons
 _USUAL_FINGERS_MM_S = 50.0
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
@@ -45,7 +40,7 @@ _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 @check_arguments
 def read_arm(path: str | Path) -> Arm:
-    """The arm of an arm file, built and measured.
+    """The arm of an arm file.
 
     Raises:
         InputError: Anything that is wrong in the file or in the models that it names.
@@ -54,9 +49,8 @@ def read_arm(path: str | Path) -> Arm:
 
 
 def read_described(description: ArmDescription) -> Arm:
-    """The arm of a description, as it was built and measured when its files were as they are now."""
-    files = (description.file, *_files(description))
-    times = tuple((str(each), each.stat().st_mtime_ns) for each in files if each.is_file())
+    """The arm of a description, as it was built when its files were as they are now."""
+    times = tuple((str(each), each.stat().st_mtime_ns) for each in model_files(description) if each.is_file())
     if times not in _BUILT:
         while len(_BUILT) >= _MOST_BUILT:
             del _BUILT[next(iter(_BUILT))]
@@ -76,29 +70,25 @@ def build_arm(description: ArmDescription) -> Arm:
     flange, T_flange = find_flange(model, description)
     joints = find_joints(model, flange, description)
     last = model.body(flange).name
-    if description.gripper.slides is not None:
+    if description.hand_file is None:
         return stated_arm(description, model, joints, last)
-    _mount_gripper(spec, last, T_flange, description)
-    _make_passive(spec, joints)
-    if description.gripper.pads is None:
-        fill_grooves(spec, joints)
+    mount_gripper(spec, last, T_flange, description)
+    make_passive(spec, joints)
+    fill_grooves(spec, joints)
     whole = compile_model(spec, mjcf)
     drives = drives_of(whole, joints)
-    home = _usual_home(model, joints) if description.home_deg is None else np.radians(description.home_deg)
+    home = usual_home(model, joints) if description.home_deg is None else np.radians(description.home_deg)
     require(
         len(home) == len(joints),
         f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.",
     )
-    gripper = _with_names_as_mounted(whole, description.gripper)
-    where = description.gripper_file or mjcf
-    with without_log_file():
-        measured, times = with_force(
-            spec,
-            gripper.force_n,
-            description.file,
-            lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, last, gripper),
-        )
-    hand = measured.hand
+    gripper = read_gripper(description.hand_file)
+    prefix = "" if description.gripper_file is None else _GRIPPER
+    left, right = (find_pad(whole, prefix + name, description.hand_file) for name in gripper.pads)
+    hand = gripper.hand(prefix, (left, right))
+    mount = last if gripper.mount is None else prefix + gripper.mount
+    check_names(whole, hand, mount, description.hand_file)
+    scale_drive(spec, hand.actuators, gripper.drive_scale)
     base = pose.pack(description.base_frame)
     arm = Arm(
         mjcf=description.file,
@@ -108,30 +98,42 @@ def build_arm(description: ArmDescription) -> Arm:
         tip=_TIP,
         fingers=hand.joints,
         grip="",
-        mount=measured.mount,
+        mount=mount,
         home=home,
         opening_m=float(hand.opening[-1]),
         squeeze_m=hand.squeeze_m,
-        model=_text(spec, measured),
+        model=_with_tip(spec, mount, gripper.tip_frame(description.hand_file)),
         hand=hand,
         limits=ArmLimits(
             payload_kg=description.payload_kg,
             speed_rad_s=speed_limits(description, len(joints)),
             torque_nm=np.array([drives[name].torque for name in joints]),
-            fingers_m_s=1e-3 * (gripper.speed_mm_s or _USUAL_FINGERS_MM_S),
+            fingers_m_s=1e-3 * (description.gripper.speed_mm_s or _USUAL_FINGERS_MM_S),
         ),
-        files=_files(description),
+        files=model_files(description),
     )
     if description.home_deg is None:
         arm = with_home(arm, description.base is not None)
     own = _drive(spec, joints, felt_inertia(whole, joints, arm.home), drives, hand.actuators, description)
     spec.compile()
     control = "own position actuators" if own else "position servos made from the model"
-    stronger = f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""
+    scale = gripper.drive_scale
+    stronger = f", gripper drive {scale:.3g} times as strong as in the model" if scale != 1.0 else ""
     return replace(arm, model=str(spec.to_xml()), control=control + stronger)
 
 
-def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
+def _with_tip(spec: Any, mount: str, T: Array) -> str:
+    """The whole as MJCF, with the site of the tip."""
+    for site in list(spec.sites):
+        if site.name == _TIP:
+            site.name = f"{_TIP}_of_the_model"
+    spec.body(mount).add_site(name=_TIP, pos=T[:3, 3], quat=_quaternion(T), size=(0.003, 0.003, 0.003), group=4)
+    spec.modelname = "arm"
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
     """Attach the gripper of another file to the flange, a body."""
     if description.gripper_file is not None:
         hand = load_model(description.gripper_file, "gripper")
@@ -144,22 +146,7 @@ def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDesc
         )
 
 
-def _with_names_as_mounted(model: Any, gripper: GripperDescription) -> GripperDescription:
-    """The description of a gripper, its actuators and pads called as they are called in the whole arm."""
-    if gripper.mjcf is None:
-        return gripper
-    actuators = {model.actuator(i).name for i in range(model.nu)}
-    shapes = {model.body(i).name for i in range(model.nbody)} | {model.geom(i).name for i in range(model.ngeom)}
-    if gripper.actuators is not None:
-        names = tuple(name if name in actuators else _GRIPPER + name for name in gripper.actuators)
-        gripper = structs.replace(gripper, actuators=names)
-    if gripper.pads is not None:
-        a, b = (name if name in shapes else _GRIPPER + name for name in gripper.pads)
-        gripper = structs.replace(gripper, pads=(a, b))
-    return gripper
-
-
-def _make_passive(spec: Any, joints: Sequence[str]) -> None:
+def make_passive(spec: Any, joints: Sequence[str]) -> None:
     """Nothing falls, nothing of the arm touches itself or what it stands on, and fingers do not rattle or give way."""
     for equality in spec.equalities:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _UNSAID_SOLREF:
@@ -191,14 +178,6 @@ def _turns(body: Any, joints: Sequence[str]) -> bool:
     return False
 
 
-def _measuring_model(spec: Any, mjcf: Path) -> Any:
-    """The arm with a part to push on, which waits far away."""
-    rig = spec.copy()
-    probe = rig.worldbody.add_body(name=PROBE, mocap=True, pos=(0.0, 0.0, -1.0))
-    probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.01, 0.01), contype=0, conaffinity=1)
-    return compile_model(rig, mjcf)
-
-
 def _drive(
     spec: Any,
     joints: Sequence[str],
@@ -228,25 +207,7 @@ def _drive(
     return False
 
 
-def _text(spec: Any, measured: Measured) -> str:
-    """The whole as MJCF, with the site of the tip."""
-    for site in list(spec.sites):
-        if site.name == _TIP:
-            site.name = f"{_TIP}_of_the_model"
-    T = measured.T_mount_tip
-    size = (0.003, 0.003, 0.003)
-    spec.body(measured.mount).add_site(name=_TIP, pos=T[:3, 3], quat=_quaternion(T), size=size, group=4)
-    spec.modelname = "arm"
-    spec.compile()
-    return str(spec.to_xml())
-
-
-def _files(description: ArmDescription) -> tuple[Path, ...]:
-    gripper = () if description.gripper_file is None else named_files(description.gripper_file)
-    return tuple(dict.fromkeys((description.file, *named_files(description.model_file), *gripper)))
-
-
-def _usual_home(model: Any, joints: Sequence[str]) -> Array:
+def usual_home(model: Any, joints: Sequence[str]) -> Array:
     """The middle of the range of each joint, or zero."""
     at = [model.joint(name).id for name in joints]
     low, high = model.jnt_range[at].T

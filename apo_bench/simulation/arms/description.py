@@ -10,6 +10,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.io import Finite, Table, Text, read_typed
 from apo_bench.scenario.values import Pose
+from apo_bench.simulation.arms.gripper_file import gripper_path
 
 _USUAL_BASE = Pose(at_mm=(-450.0, 0.0, 0.0))
 """Reaches the table from behind its middle."""
@@ -20,42 +21,36 @@ Torque = Annotated[float, Meta(gt=0.0, le=1e5)]
 
 
 class GripperDescription(Table, frozen=True, kw_only=True):
-    """The gripper and its drive; what is None is found in the model, or measured.
+    """The gripper and its drive: a gripper file as `hand`, or `slides`.
 
-    A gripper whose `slides` are stated is not measured: a finger on each side slides, and one actuator drives both.
+    Slides are a finger on each side that slides, both driven by one actuator; the model is used as it is.
     """
 
+    hand: Text | None = None
+    """What it does: the short name or the path of a gripper file."""
     mjcf: Text | None = None
     """None: it is part of the arm's file."""
     mount: Pose = Pose(at_mm=(0.0, 0.0, 0.0))
     """Its frame in the flange."""
-    actuators: Names | None = None
-    open: Numbers | None = None
-    """The command at which it is widest open, one number for each actuator, in their own units."""
-    closed: Numbers | None = None
-    pads: tuple[Text, Text] | None = None
-    """A body or geom of each side, whose surface holds a part."""
     speed_mm_s: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     """The fastest each pad moves; None: 50, as a Franka Hand."""
-    force_n: Annotated[float, Meta(ge=1.0, le=60.0)] | None = None
-    """How hard each pad pushes on a part of half the opening; None: as in the model, if that holds a part."""
     slides: Names | None = None
     """The slide joints of the fingers, zero when closed."""
     tip: Text | None = None
     """The site between the fingertips: z points ahead, x along the closing direction."""
     opening_mm: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     """How far each finger opens."""
+    actuators: tuple[Text] | None = None
+    """The position actuator that drives both fingers."""
 
     def __post_init__(self) -> None:
-        if (self.open is None) != (self.closed is None):
-            raise ValueError("'open' and 'closed' are given together, or neither.")
-        if self.slides is None and self.tip is None and self.opening_mm is None:
-            return
-        if None in (self.slides, self.tip, self.opening_mm, self.actuators):
+        stated = [each is not None for each in (self.slides, self.tip, self.opening_mm, self.actuators)]
+        if not any(stated) and self.hand is None:
+            raise ValueError("what the gripper does is not stated; name its gripper file as 'hand', or state 'slides'.")
+        if any(stated) and not all(stated):
             raise ValueError("'tip', 'slides', 'opening_mm' and 'actuators' are given together; state all of them.")
-        for key in ("mjcf", "open", "closed", "pads", "force_n"):
-            if getattr(self, key) is not None:
-                raise ValueError(f"a gripper whose 'slides' are stated is not measured; leave '{key}' out.")
+        if any(stated) and (self.hand or self.mjcf):
+            raise ValueError("a gripper whose 'slides' are stated is part of the arm; leave 'hand' and 'mjcf' out.")
 
 
 class ArmTable(Table, frozen=True, kw_only=True):
@@ -63,7 +58,7 @@ class ArmTable(Table, frozen=True, kw_only=True):
 
     schema: Literal["apo-bench/arm/1"]
     mjcf: Text
-    gripper: GripperDescription = GripperDescription()
+    gripper: GripperDescription
     flange: Text | None = None
     """A site or a body; None: the last body of the one chain of hinges."""
     joints: Names | None = None
@@ -94,6 +89,11 @@ class ArmDescription(ArmTable, frozen=True, kw_only=True):
     def gripper_file(self) -> Path | None:
         """The model of the gripper; None: it is part of the model of the arm."""
         return None if self.gripper.mjcf is None else self.file.parent / self.gripper.mjcf
+
+    @property
+    def hand_file(self) -> Path | None:
+        """The gripper file; None where slides are stated."""
+        return None if self.gripper.hand is None else gripper_path(self.gripper.hand, self.file.parent)
 
     @property
     def base_frame(self) -> Array:

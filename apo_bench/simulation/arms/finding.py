@@ -28,15 +28,17 @@ _2F85 = Path("robotiq_2f85") / "2f85.xml"
 _WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver", "jaw")
 _GRIPPERS = MappingProxyType(
     {
-        "ur5e": "robotiq_gripper_85",
-        "panda": "panda_gripper",
-        "sawyer": "rethink_gripper",
-        "iiwa": "robotiq_gripper_140",
-        "kinova3": "robotiq_gripper_85",
-        "xarm7": "xarm7_gripper",
+        "ur5e": ("robotiq_gripper_85", "robosuite_robotiq_85"),
+        "panda": ("panda_gripper", "robosuite_panda"),
+        "sawyer": ("rethink_gripper", "robosuite_rethink"),
+        "iiwa": ("robotiq_gripper_140", "robosuite_robotiq_140"),
+        "kinova3": ("robotiq_gripper_85", "robosuite_robotiq_85"),
+        "xarm7": ("xarm7_gripper", "robosuite_xarm7"),
     }
 )
-"""Of robosuite's arms, the gripper that each has there."""
+"""Of robosuite's arms, the gripper that each has there, and its gripper file."""
+_HANDS = MappingProxyType({"franka_emika_panda": "franka_hand"})
+"""Of Menagerie's arms with a gripper, its gripper file."""
 _NAMES = ("six_axis", "ur5e_primitive", "panda_primitive")
 """Arms that come with the benchmark, as arm files."""
 
@@ -92,12 +94,15 @@ def _of_menagerie(name: str) -> ArmDescription:
     plain = name.replace("_", "").lower()
     files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
     require(files, f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file.")
-    gripper = None if _has_fingers(files[0]) else root / _2F85
-    require(
-        gripper is None or gripper.is_file(),
-        f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.",
-    )
-    return _foreign_arm(files[0], gripper)
+    if _has_fingers(files[0]):
+        require(
+            name in _HANDS,
+            f"{files[0]}: what the gripper of '{name}' does is not known; state its gripper file in an arm file.",
+        )
+        return _foreign_arm(files[0], None, _HANDS[name])
+    gripper = root / _2F85
+    require(gripper.is_file(), f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.")
+    return _foreign_arm(files[0], gripper, "robotiq_2f85")
 
 
 def _of_robosuite(name: str) -> ArmDescription:
@@ -112,14 +117,14 @@ def _of_robosuite(name: str) -> ArmDescription:
     if key not in _GRIPPERS or not (robots / key / "robot.xml").is_file():
         raise InputError(f"{root}: {unknown('arm', name, _GRIPPERS)}")
     mjcf = robots / key / "robot.xml"
-    gripper = root / "models" / "assets" / "grippers" / f"{_GRIPPERS[key]}.xml"
-    return _foreign_arm(mjcf, gripper, "right_hand")
+    gripper, hand = _GRIPPERS[key]
+    return _foreign_arm(mjcf, robots.parent / "grippers" / f"{gripper}.xml", hand, "right_hand")
 
 
-def _foreign_arm(mjcf: Path, gripper: Path | None, flange: str | None = None) -> ArmDescription:
+def _foreign_arm(mjcf: Path, gripper: Path | None, hand: str, flange: str | None = None) -> ArmDescription:
     """The description of an arm without an arm file."""
-    hand = GripperDescription(mjcf=None if gripper is None else str(gripper.absolute()))
-    return ArmDescription(schema="apo-bench/arm/1", file=mjcf, mjcf=mjcf.name, flange=flange, gripper=hand)
+    described = GripperDescription(hand=hand, mjcf=None if gripper is None else str(gripper.absolute()))
+    return ArmDescription(schema="apo-bench/arm/1", file=mjcf, mjcf=mjcf.name, flange=flange, gripper=described)
 
 
 def _menageries() -> Iterator[Path]:

@@ -12,9 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-_GROOVE_M = 0.008
-_SAME_M = 1e-5
-"""Wider than the first is no groove; boxes whose ends differ by less than the second are equal."""
+_GROOVE_M = 0.008  # wider is no groove
+_SAME_M = 1e-5  # boxes whose ends differ by less are equal
 
 
 def fill_grooves(spec: Any, joints: Sequence[str]) -> None:

@@ -11,21 +11,29 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame
 
-_AT = (-0.05, 0.0, 0.30)
-_TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
-"""Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room; ways it may wait."""
-_TURNS = (-1.6, 0.0, 1.6)
-_WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+_AT = (-0.05, 0.0, 0.30)  # place of the waiting tip, [m]
+_TABLE = [
+    (-0.15, -0.25, 0.03),
+    (-0.15, 0.25, 0.3),
+    (0.2, 0.25, 0.03),
+    (0.2, -0.25, 0.3),
+]  # places of the tip, [m], at which there should be room
+_TURNS = (-1.6, 0.0, 1.6)  # turns from the way it waits, [rad], at which there should be room
+_WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)  # ways it may wait, [rad]
 _MOST_PLACES = len(_TABLE) * len(_TURNS)
-_NEARER_M = (-0.4, -0.3, -0.2, -0.1)
-_STANDS_M = (0.0, 0.1, 0.2)
-"""Where the base of an arm may stand that reaches at most half of these: behind the middle of the table, how high."""
-_TRIES = 40
-_QUICK_TRIES = 16
-_WIDEST = 3.0
-_SAME_RAD = 0.2
-_TABLE_ROOM_M = 0.02
-_NEAR = 0.4
+_NEARER_M = (
+    -0.4,
+    -0.3,
+    -0.2,
+    -0.1,
+)  # places of a base behind the middle of the table, of an arm that reaches at most half
+_STANDS_M = (0.0, 0.1, 0.2)  # heights of such a base
+_TRIES = 40  # random starts of the search
+_QUICK_TRIES = 16  # as `_TRIES`, for each other place of the base
+_WIDEST = 3.0  # [rad]: no start is farther from zero
+_SAME_RAD = 0.2  # homes that differ by less are one
+_TABLE_ROOM_M = 0.02  # links stay so far above the table
+_NEAR = 0.4  # every other start is so near to the middle of the ranges
 _ENOUGH_RAD = 0.3
 """More room to a limit than this counts less than links that are high above the table."""
 

@@ -14,10 +14,8 @@ import numpy as np
 
 from apo_bench.geometry import Array
 
-_SOFT_HZ = 15.0
-_MOST_HZ = 45.0
-"""A position actuator whose joint would swing slower than the first is too soft; none is made that swings faster than
-the second."""
+_SOFT_HZ = 15.0  # a position actuator whose joint would swing slower is too soft
+_MOST_HZ = 45.0  # none is made that swings faster
 _STIFF_NM = 5000.0
 """As stiff as this, [Nm/rad], where the second frequency allows it."""
 

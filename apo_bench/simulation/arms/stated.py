@@ -1,5 +1,6 @@
 """Make the arm of a description that states its gripper: the model is used as it is."""
 
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -10,6 +11,14 @@ from apo_bench.geometry import Array, pose
 from apo_bench.io import named_files
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.description import ArmDescription
+
+
+def model_files(description: ArmDescription) -> tuple[Path, ...]:
+    """All files that an arm is made of."""
+    named = [description.file, *named_files(description.model_file)]
+    if description.gripper_file is not None:
+        named += named_files(description.gripper_file)
+    return tuple(dict.fromkeys([*named, *([] if description.hand_file is None else [description.hand_file])]))
 
 
 def speed_limits(description: ArmDescription, joints: int) -> Array | None:
@@ -33,11 +42,8 @@ def stated_arm(description: ArmDescription, model: Any, joints: list[str], flang
     gripper = description.gripper
     if description.home_deg is None or len(description.home_deg) != len(joints):
         raise InputError(f"{file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
-    require(
-        description.torque_nm is None, f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out."
-    )
-    (grip, *more) = gripper.actuators or ("",)
-    require(not more, f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
+    require(description.torque_nm is None, f"{file}: 'torque_nm' is for an arm with a gripper file; leave it out.")
+    (grip,) = gripper.actuators or ("",)
     require_known("site", gripper.tip or "", [model.site(i).name for i in range(model.nsite)], place=file)
     sliding = [
         model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -64,5 +70,5 @@ def stated_arm(description: ArmDescription, model: Any, joints: list[str], flang
             speed_rad_s=speed_limits(description, len(joints)),
             fingers_m_s=ArmLimits.fingers_m_s if gripper.speed_mm_s is None else 1e-3 * gripper.speed_mm_s,
         ),
-        files=tuple(dict.fromkeys((file, *named_files(description.model_file)))),
+        files=model_files(description),
     )

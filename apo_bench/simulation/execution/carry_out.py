@@ -28,20 +28,17 @@ from apo_bench.simulation.robot import (
 )
 from apo_bench.simulation.robot.paths import distance
 
-_LIFT = (0.4, 0.25)
-_CARRY = (0.5, 0.35)
-_LOWER = (0.35, 0.2)
-"""Peak speeds with a part, and with one that carries others, [m/s]: it drifts in the hand, the faster the more."""
+_LIFT = (0.4, 0.25)  # peak speeds [m/s] with a part, and with one that carries others
+_CARRY = (0.5, 0.35)  # as `_LIFT`, through the air
+_LOWER = (0.35, 0.2)  # as `_LIFT`, down; the faster, the more a part drifts in the hand
 _LOST_LOAD = 0.8
 """A hand that weighs less than this part of the weight of a group has lost some of it."""
-_PLACE = 0.06
-_TOUCH = 0.01
-_INSERT = 0.06
-_SLIDE = 0.005
-"""Steady speeds [m/s]: down to just above the support, onto it, along an insertion, against a part at the side."""
-_PULL = 0.1
-_LEAVE = 0.03
-"""Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
+_PLACE = 0.06  # [m/s] down to just above the support
+_TOUCH = 0.01  # [m/s] onto the support
+_INSERT = 0.06  # [m/s] along an insertion
+_SLIDE = 0.005  # [m/s] against a part at the side
+_PULL = 0.1  # peak speed [m/s] of a part that is pulled out
+_LEAVE = 0.03  # peak speed [m/s] of a part that is moved off a side
 _OVERTRAVEL_M = 0.002
 """Contact is sought this far beyond the goal."""
 _BOTTOM_M = 0.003
@@ -50,12 +47,10 @@ _ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
 _THROUGH = 0.15
 """Steady speed [m/s] where only walls are that the part is between already."""
-_BEFORE_M = 0.008
-_BEHIND_M = 0.004
-"""The entrance of a hole may be so much nearer or farther than estimated."""
-_BEYOND_M = 0.004
-_OFF_M = 0.0003
-"""A slide may go this much beyond the goal, this high over the floor."""
+_BEFORE_M = 0.008  # the entrance of a hole may be nearer by this
+_BEHIND_M = 0.004  # and farther by this
+_BEYOND_M = 0.004  # a slide may go beyond the goal by this
+_OFF_M = 0.0003  # and over the floor by this
 _LOOSE_M = 0.00005
 """Faces this far apart touch for the judge, and do not rub."""
 

@@ -13,13 +13,11 @@ from apo_bench.simulation.robot import (
     with_height,
 )
 
-_FREE = 2.0
-_NEAR = 0.8
-"""Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
-_DEPART_M = 0.09
-OPEN_TO_PICK_M = 0.012
-OPEN_TO_RELEASE_M = 0.008
-"""How far each finger stands off before it closes, and when it has let go."""
+_FREE = 2.0  # peak speed [m/s] of the empty hand in the air
+_NEAR = 0.8  # as `_FREE`, close to parts
+_DEPART_M = 0.09  # the hand moves back by this after a release
+OPEN_TO_PICK_M = 0.012  # each finger stands off by this before it closes
+OPEN_TO_RELEASE_M = 0.008  # and by this after a release
 _LOST_M = 0.002
 """Fingers that close this far beyond the part's surface hold nothing; those of a linkage that gives way, a quarter of
 the way to the middle."""

@@ -23,9 +23,8 @@ _LOWEST_M = 1e-4
 """Corners this near to the lowest one lie on the floor."""
 _LIFT_M = 0.01
 """What stood is lifted so far before it is laid down again."""
-_LIFT_ROOM_M = 0.002
-_LIFT_STEP_M = 0.003
-"""On the way down everything else stays this far away; it is looked at this often."""
+_LIFT_ROOM_M = 0.002  # on the way down everything else stays this far away
+_LIFT_STEP_M = 0.003  # which is checked so often
 
 
 class FlatPlacement(NamedTuple):
@@ -80,7 +79,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
             return None
     tip = flush @ t.grips[0].T_part_tip
     width = t.grips[0].half_width
-    if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
+    if gripper_depth(scene.kinematics, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
         return None
     return highest
 

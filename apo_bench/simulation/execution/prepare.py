@@ -40,11 +40,9 @@ from apo_bench.simulation.robot import Trajectory, at_end, follow_waypoints, pla
 from apo_bench.simulation.scene import Scene
 
 _GRAVITY = 9.81
-_PLACE_WEIGHTS = 6.0
-_INSERT_WEIGHTS = 2.5
-_SLIDE_WEIGHTS = 0.5
-"""Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
-part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
+_PLACE_WEIGHTS = 6.0  # guard of what is put down, in its weights
+_INSERT_WEIGHTS = 2.5  # guard of an insertion, in weights of the lightest part that it could push along
+_SLIDE_WEIGHTS = 0.5  # guard of a slide, in weights of the lightest part at the side: friction of 0.8 holds 0.8 of them
 _FIRM_N = 80.0
 """Friction of both pads. Through walls that are not the last, the bore of an upper plate, a firm hand carries on at
 speed; its rim strikes the part with some 30 N, which moves it in a weaker hand, and the plate."""

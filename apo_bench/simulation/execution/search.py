@@ -13,20 +13,17 @@ from apo_bench.simulation.robot import Guard, Robot, Trajectory, servo, smooth_t
 
 RADIUS_M = 0.002
 """The robot searches for a hole so far off."""
-YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
-YAWED_RADIUS_M = 0.001
-"""Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
-_BACK_M = 0.0005
-_BACK = 0.005
-_BRING = 0.03
-"""Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
+YAWS_DEG = (1.0, -1.0, 2.0, -2.0)  # turns about the vertical at which shorter spirals follow
+YAWED_RADIUS_M = 0.001  # how far these go
+_BACK_M = 0.0005  # drawn back so far, a part touches nothing ahead
+_BACK = 0.005  # peak speed [m/s] back
+_BRING = 0.03  # peak speed [m/s] to where a spiral begins
 _DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
 SEARCHES = 3
 """A motion is searched for so many times at most, in one transfer up to twice as often."""
-_PIECE_M = 0.01
-_NOTHING_M = 1e-6
-"""Giving way, the tip goes on in pieces of this length; less than the second is nothing."""
+_PIECE_M = 0.01  # giving way, the tip goes on in pieces of this length
+_NOTHING_M = 1e-6  # less than this is nothing
 
 
 def press_in(

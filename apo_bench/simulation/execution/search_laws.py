@@ -13,10 +13,9 @@ from apo_bench.simulation.robot import Guard, LowPass
 
 PITCH_M = 0.00035
 """Distance between the turns of a spiral; the usual play of 0.5 mm is wider."""
-_ACROSS = 0.01
-_FEED = 0.005
-_EASE = 0.02
-"""Speeds [m/s]: along the spiral, ahead where nothing pushes back, and ahead in a hole."""
+_ACROSS = 0.01  # [m/s] along the spiral
+_FEED = 0.005  # [m/s] ahead where nothing pushes back
+_EASE = 0.02  # [m/s] ahead in a hole
 _SOFT = 0.02
 """How fast the speed ahead grows, [m/s^2]: what lost touch by a few hundredths of a millimetre comes back softly."""
 _YIELD = 0.0005
@@ -25,9 +24,8 @@ _FELT_S = 0.01
 """Forces are averaged over this time: hard parts rattle."""
 _INNER_M = 0.0005
 """Inside this radius the spiral is slower: around its middle it would turn at once."""
-_PATIENCE = 3.0
-_DOWN_S = 1.0
-"""A spiral ends after so many times the time that its length takes, and this long, [s], for the way ahead."""
+_PATIENCE = 3.0  # a spiral ends after so many times the time that its length takes
+_DOWN_S = 1.0  # and this long for the way ahead
 
 
 class _Felt:

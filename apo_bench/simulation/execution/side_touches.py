@@ -28,9 +28,9 @@ _OVER_M = 0.003
 """The lower place is so high over the lowest point of the part; that stays so high over the foot of the wall."""
 _APART_M = 0.01
 """Places that are less far apart determine a tilt no better than feet do."""
-_ROOM_M = 0.001
-_STEP_M = 0.002
-_LOOKS_M = 0.004
+_ROOM_M = 0.001  # everything else stays so far away
+_STEP_M = 0.002  # places along the wall are so far apart
+_LOOKS_M = 0.004  # room is checked so often on the way down
 
 
 class SideTouch(NamedTuple):
@@ -132,7 +132,7 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
         if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
             return False
     at = tip[:3, 3] + whole
-    if gripper_depth(scene, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
+    if gripper_depth(scene.kinematics, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
         return False
     over = scene.kinematics.inverse(with_height(tip, t.safe), np.array(scene.arm.home))
     return over is not None and scene.kinematics.inverse(tip, over) is not None

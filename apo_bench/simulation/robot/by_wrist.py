@@ -21,12 +21,10 @@ ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
 _SETTLE_S = 0.06
 """A low pass has forgotten its first reading but for 0.25 % then."""
-_SHIFT_M = 0.001
-_TURN_RAD = 0.002
-"""How far the tip is moved in thought to see how the joints turn."""
-_FAR_M = 0.0005
-_FAR_RAD = 0.0025
-"""Moved farther than this, it is looked at again."""
+_SHIFT_M = 0.001  # shift of the tip by which the joint gradients are computed
+_TURN_RAD = 0.002  # turn of the tip by which they are computed
+_FAR_M = 0.0005  # shifted farther than this, they are computed again
+_FAR_RAD = 0.0025  # or turned by more than this
 
 
 def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
@@ -70,7 +68,7 @@ def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
         return
     before = robot.wrist, robot.fidelity
     robot.wrist, robot.fidelity = wrist, "full"
-    wrist.begin(hand_load(robot.scene.kinematics, robot.arm, robot.opening()))
+    wrist.begin(hand_load(robot.scene.kinematics, robot.opening()))
     try:
         with wrist_sensors_on(robot.model):
             robot.wait(_SETTLE_S)

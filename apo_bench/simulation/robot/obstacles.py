@@ -19,16 +19,14 @@ from apo_bench.simulation.scene import Scene, World, part_pose
 
 NEAR_HELD_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
-_LOOKS = 100
-_APART_M = (0.0002, 0.001)
-"""So many looks are taken along a line, but not closer together than the first nor further apart than the second."""
+_LOOKS = 100  # looks along a line
+_APART_M = (0.0002, 0.001)  # not closer together than the first, nor farther apart than the second
 _RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
 _SHORTEST_S = 0.05
 """Less than this is not worth leaving out."""
-_STILL_M_S = 1e-3
-_STILL_RAD_S = 2e-2
-"""While a part that is not held moves faster, nothing is left out."""
+_STILL_M_S = 1e-3  # while a part that is not held moves faster, nothing is left out
+_STILL_RAD_S = 2e-2  # or turns faster
 _UPRIGHT = 1e-6
 
 _Flags = NDArray[np.bool_]
@@ -62,7 +60,7 @@ def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held:
     """The gripper at an opening [m], and the parts that it holds, as they move with the tip."""
     inverse = pose.inverse(T_tip)
     parts = [Moving(scene.pieces[part], inverse @ part_pose(scene.work, data, part)) for part in held]
-    return [Moving(gripper_boxes(scene.kinematics, scene.arm, round(opening, 4)), np.eye(4)), *parts]
+    return [Moving(gripper_boxes(scene.kinematics, round(opening, 4)), np.eye(4)), *parts]
 
 
 def near_spans(

@@ -15,9 +15,8 @@ _SHORTEST_S = 0.15
 """No smooth motion is shorter."""
 _RAMP_S = 0.1
 """How long a steady motion gains and loses speed."""
-_GAIN = 0.6
-_CELL_M = 2e-5
-"""How fast a paced motion gains and loses speed, [m/s^2]; its speed is found in cells of this length."""
+_GAIN = 0.6  # [m/s^2]: how fast a paced motion gains and loses speed
+_CELL_M = 2e-5  # its speed is found in cells of this length
 _STRAIGHT = 1e-8
 """Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
 

@@ -12,19 +12,16 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import Trajectory, smooth_trajectory, waypoints_around, waypoints_unwound
 
-_KNOT_M = 0.03
-_KNOT_RAD = 0.15
-"""Inverse kinematics is solved at least this densely along a line."""
-_SHORT_M = 0.01
-_SHORT_RAD = 0.05
-"""So short a line has one knot in its middle; any other has two at least."""
+_KNOT_M = 0.03  # inverse kinematics is solved at least this densely along a line
+_KNOT_RAD = 0.15  # and along a turn
+_SHORT_M = 0.01  # so short a line has one knot in its middle, any other two at least
+_SHORT_RAD = 0.05  # as `_SHORT_M`, of a turn
 _SPEED_LOOKS = 101
 """Times at which the speed of joints is looked at."""
 _CREEP_RAD_S = 2e-3
 """Dry friction is full above some such."""
-_FAR_M = 0.3
-_FAR_RAD = 1.0
-"""The spacing of knots where only the joint angles at the end are needed, and nothing is between them."""
+_FAR_M = 0.3  # spacing of knots where only the end counts
+_FAR_RAD = 1.0  # as `_FAR_M`, of a turn
 
 
 class Knots(NamedTuple):

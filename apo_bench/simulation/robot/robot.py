@@ -29,9 +29,8 @@ from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene import Scene, has_failed, initial_state, is_unstable, part_pose, sensors_off, timestep
 
-_REST_RAD_S = 2e-3
-_REST_M_S = 3e-3
-"""Joints and fingers that move slower than this rest."""
+_REST_RAD_S = 2e-3  # joints that move slower rest
+_REST_M_S = 3e-3  # fingers that move slower rest
 
 
 class ExecutionAborted(Exception):

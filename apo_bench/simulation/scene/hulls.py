@@ -6,9 +6,8 @@ import numpy as np
 
 from apo_bench.geometry import Array, Hull, first_of_each, remembered
 
-ON_M = 1e-7
-PARALLEL = 1e-7
-"""Planes that are nearer than this, and no more apart in their normals, are one."""
+ON_M = 1e-7  # planes that are nearer are one
+PARALLEL = 1e-7  # if their normals differ by no more
 _SAME_VOLUME = 1e-6
 
 

@@ -26,13 +26,11 @@ LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned."""
 CLEARANCE_M = 0.25e-3
 """Play per side of fit faces where none is stated, since parts without any cannot be put together."""
-_DENSITY = 600.0
-_FRICTION = 0.8
-"""[kg/m^3] and coefficient of sliding, of wood, as in the part files."""
-SOFT_S = 0.3
-_LONGEST_S = 1.5
-_REST_S = 0.05
-"""How long parts move as in syrup; when an operation ends at the latest; how long rest must last."""
+_DENSITY = 600.0  # [kg/m^3], of wood, as in the part files
+_FRICTION = 0.8  # coefficient of sliding, of wood
+SOFT_S = 0.3  # parts move as in syrup so long
+_LONGEST_S = 1.5  # an operation ends at the latest
+_REST_S = 0.05  # rest must last so long
 _SYRUP = 200.0
 """Damping while parts move as in syrup, [1/s]: a part falls at 5 cm/s."""
 _SLOW = np.repeat([1e-3, np.radians(1.0)], 3)

@@ -32,9 +32,8 @@ _THICK_M = 1e-3
 """How thick a wall is, or half as thick as the part is there."""
 _SECTORS = 4
 """What is behind the walls of a hole becomes at least so many pieces."""
-_THINNEST_M = 5e-5
-_SMALLEST_M3 = 1e-12
-"""What is behind a wall and smaller is left out: MuJoCo takes no such mesh."""
+_THINNEST_M = 5e-5  # nothing thinner is made
+_SMALLEST_M3 = 1e-12  # smaller pieces behind a wall are left out: MuJoCo takes no such mesh
 _LOST = 0.05
 """Of two walls no more than this part is cut away where they become one."""
 

@@ -34,27 +34,22 @@ _YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N], as in a search."""
 _FELT_S = 0.01
 """Forces are averaged over this time."""
-_GAIN = 0.6
-_SOFT = 0.02
-"""How fast the approach gains speed, [m/s^2]: in free air, and after a first touch."""
-_FEED = 0.005
-_EASE = 0.02
+_GAIN = 0.6  # [m/s^2]: how fast the approach gains speed in free air
+_SOFT = 0.02  # [m/s^2]: and after a first touch
+_FEED = 0.005  # [m/s]: its greatest speed once it was stopped
+_EASE = 0.02  # [m/s]: and deeper than that by `_DEEP_M`
 _DEEP_M = 0.001
-"""Its greatest speeds once it was stopped, [m/s]: up to so much deeper than there, and from there on."""
 _MET = 0.8
 """The light push is met from this part of it on."""
 _STRUCK = 0.03
 """Faster than this, [m/s], it stops by the force of a single step; else by the average."""
-_ACROSS_M = 0.015
-_TURN_RAD = math.radians(10.0)
-"""How far actions move the tip off the line of the approach."""
-_BACK_M = 0.01
-_BEYOND_M = 0.003
-"""How far behind its start, and beyond the end of the line, actions move the tip along it."""
-_ARRIVED_M = 0.0002
-_PUSHED = 4
-_NEAR_M = 0.002
-"""The approach has arrived at its end, or where it was pushed back at so many actions running and is this near."""
+_ACROSS_M = 0.015  # actions move the tip off the line of the approach by this at most
+_TURN_RAD = math.radians(10.0)  # and turn it by this
+_BACK_M = 0.01  # behind its start by this
+_BEYOND_M = 0.003  # and beyond the end of the line by this
+_ARRIVED_M = 0.0002  # the approach has arrived this near to its end
+_PUSHED = 4  # or pushed back at so many actions in a row
+_NEAR_M = 0.002  # and this near
 
 
 class TipReading(NamedTuple):

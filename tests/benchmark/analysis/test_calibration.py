@@ -58,12 +58,12 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert (shifted["failed_tests"], shifted["culprits"]) == ((2, 3), (1, 2))
     assert (missed["failed_tests"], missed["culprits"]) == ((1, 1), (0, 0))
     lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
-    assert "| none | 0 | – | – | – | – | – | – |" in lines
+    assert "| uncorrected | 0 | – | – | – | – | – | – |" in lines
     assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
 
 
 def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
     folder = write(tmp_path / "new", [row()])
     assert read_records(folder) == [dict.fromkeys(RECORD_FIELDS) | row()]
-    with pytest.raises(InputError, match="a row of schema 'apo-bench/row/8' was given"):
+    with pytest.raises(InputError, match="a record of schema 'apo-bench/row/8' was given"):
         read_records(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))

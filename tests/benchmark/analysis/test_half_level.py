@@ -77,6 +77,6 @@ def test_only_levels_of_as_many_degrees_as_mm_are_on_a_curve() -> None:
     rows = [row("contact", seed, seed > 2, noise_mm=x, noise_deg=x) for seed in range(8) for x in (0.5, 1.0)]
     rows += [row("contact", 0, None, noise_mm=2.0, noise_deg=2.0), row("contact", 9, noise_mm=4.0, noise_deg=1.0)]
     (found,) = half_levels(tally([*rows, row("oracle"), row("paper", 1)]))
-    assert (found.place.method, found.largest, found.trials) == ("contact", 1.0, 16)
+    assert (found.condition.method, found.largest, found.trials) == ("contact", 1.0, 16)
     ranged = [row("contact", 0, noise="depth-camera", noise_mm=x, noise_deg=0.0) for x in (1.0, 2.0)]
     assert [h.largest for h in half_levels(tally(ranged))] == [2.0]

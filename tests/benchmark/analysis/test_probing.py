@@ -1,4 +1,4 @@
-"""What robots felt about themselves: summaries beside what was drawn and told, and what cells and tables say of it."""
+"""What robots probing_results about themselves: summaries beside what was drawn and told, and what cells and tables say of it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from apo_bench.benchmark.analysis import felt, members, settings, tally
-from apo_bench.benchmark.analysis.paired import place_of_reference
-from apo_bench.benchmark.report.tables.cells import cell_table
-from apo_bench.benchmark.report.tables.methods import felt_table
+from apo_bench.benchmark.analysis import members, probing_results, settings, tally
+from apo_bench.benchmark.analysis.paired import reference_condition
+from apo_bench.benchmark.report.tables.conditions import condition_table
+from apo_bench.benchmark.report.tables.methods import probing_table
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -26,27 +26,27 @@ def probe(seed: int, mm: float, method: str = "contact+probe", **more: Any) -> d
 
 
 def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> None:
-    (found,) = felt([probe(0, 0.3), probe(1, 0.4), row("contact")])
-    assert (found["trials"], found["touches"], found["refused"]) == (2, 6.5, 1)
-    assert found["base_error_estimate_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
-    assert (found["sure_mm"], found["sure_deg"]) == pytest.approx((0.2, 0.05))
-    assert found["drawn_mm"] == found["stated_mm"] == pytest.approx(math.sqrt(3) * 0.5)
-    assert found["drawn_deg"] == found["stated_deg"] == pytest.approx(math.sqrt(3) * 0.1)
+    (found,) = probing_results([probe(0, 0.3), probe(1, 0.4), row("contact")])
+    assert (found["trials"], found["probe_contacts"], found["rejected"]) == (2, 6.5, 1)
+    assert found["estimated_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
+    assert (found["std_mm"], found["std_deg"]) == pytest.approx((0.2, 0.05))
+    assert found["drawn_mm"] == found["assumed_mm"] == pytest.approx(math.sqrt(3) * 0.5)
+    assert found["drawn_deg"] == found["assumed_deg"] == pytest.approx(math.sqrt(3) * 0.1)
 
 
 @pytest.mark.parametrize(("stated", "told"), [("unknown", None), ("tool:1", (0.0, 0.0)), ("matched", (0.866, 0.173))])
 def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
-    (found,) = felt([probe(0, 0.3, assumed_robot_error=stated)])
-    said = (found["stated_mm"], found["stated_deg"])
+    (found,) = probing_results([probe(0, 0.3, assumed_robot_error=stated)])
+    said = (found["assumed_mm"], found["assumed_deg"])
     assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
-    (line,) = felt_table((found,)).lines
+    (line,) = probing_table((found,)).lines
     assert "0.87" in line
     assert "0.30" in line
     assert ("–" in line) == (told is None)
 
 
 def test_where_no_robot_felt_one_sentence_says_so() -> None:
-    assert felt_table(felt([row("contact")])).markdown() == ["No robot felt."]
+    assert probing_table(probing_results([row("contact")])).markdown() == ["No robot probed."]
 
 
 def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None:
@@ -63,9 +63,9 @@ def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None
         ("joint-torque", ("contact", "contact+probe")),
         ("wrist", ("contact", "contact+probe")),
     ]
-    assert ["wrench cobot" in s.title for s in groups] == [s.ft_sensor == "joint-torque" for s in groups]
-    assert place_of_reference(cells[2], "uncorrected").ft_sensor == "wrist"
-    table = cell_table(cells)
+    assert ["sensor joint-torque" in s.title for s in groups] == [s.ft_sensor == "joint-torque" for s in groups]
+    assert reference_condition(cells[2], "uncorrected").ft_sensor == "wrist"
+    table = condition_table(cells)
     shown = [column.head for column in table.shown].index("ft_sensor")
     assert [line[shown] for line in table.lines] == ["any", "wrist", "joint-torque"]
     assert "assumed_robot_error" not in [column.head for column in table.shown]

@@ -16,9 +16,8 @@ from statsmodels.stats.proportion import proportion_confint
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import Rate, confusions, efforts, members, summary, tally, wilson
 from apo_bench.benchmark.analysis import settings as settings_of_cells
-from apo_bench.benchmark.report.figures.style import OWN_STYLES, STYLES
 from apo_bench.benchmark.report.report import report
-from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
 from apo_bench.records import RECORD_SCHEMA
 from tests import pages
@@ -133,24 +132,19 @@ def test_rows_are_counted_into_cells() -> None:
     assert raw.interval == wilson(1, 4)
 
 
-def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
-    given = ("snap", "paper-track", "contact", "paper", "uncorrected", "oracle")
-    assert [c.method for c in tally([row(method) for method in given])] == [
-        *("oracle", "uncorrected", "contact", "paper", "paper-track", "snap")
-    ]
-
-
 def test_predictions_are_counted_against_physics() -> None:
     rows = [
         row(seed=0),
-        row(seed=1, predicted=foretold(True)),
+        row(seed=1, failure_prediction=foretold(True)),
         row(seed=2, success=False),
-        row(seed=3, success=False, predicted=foretold(True, 2)),
+        row(seed=3, success=False, failure_prediction=foretold(True, 2)),
         row(seed=4, success=False, failure_stage="judge", failure_code="gap", failure_operation=None),
-        row(seed=5, success=False, predicted=foretold(False)),
-        row(seed=6, success=False, failure_stage="correct", failure_operation=None, predicted=None),
+        row(seed=5, success=False, failure_prediction=foretold(False)),
+        row(seed=6, success=False, failure_stage="correct", failure_operation=None, failure_prediction=None),
         row(seed=7, success=None),
-        row(seed=8, success=False, failure_stage="promise", failure_code="abstained", predicted=foretold(False)),
+        row(
+            seed=8, success=False, failure_stage="promise", failure_code="abstained", failure_prediction=foretold(False)
+        ),
         row("oracle", seed=0),
         row(seed=0, scenario="stick_on_castles", noise_mm=None, noise_deg=None, human_error_scale=None),
     ]
@@ -163,21 +157,6 @@ def test_predictions_are_counted_against_physics() -> None:
         "Predicted: 6 of 8 executed trials ended as predicted (75.0 %, counted by as_demonstrated); failures that were "
         "not predicted: 1, warnings that were wrong: 1."
     )
-
-
-@settings(max_examples=30, deadline=None)
-@given(
-    results=st.lists(st.tuples(st.sampled_from([True, False, None]), st.booleans(), st.booleans()), max_size=20),
-)
-def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | None, bool, bool]]) -> None:
-    rows = [
-        row("paper" if i % 2 else "uncorrected", seed=i, success=s, predicted=foretold(fails) if s or said else None)
-        for i, (s, fails, said) in enumerate(results)
-    ]
-    *parts, everything = confusions(rows)
-    assert everything["executed"] + everything["not_executed"] + everything["excluded"] == len(rows)
-    for name in ("executed", "right", "predicted_fit_failed", "predicted_fail_fitted", "not_executed", "excluded"):
-        assert sum(line[name] for line in parts) == everything[name]
 
 
 @settings(max_examples=30, deadline=None)
@@ -201,33 +180,20 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
             row("paper", seed=i, success=None if i == 3 else True, noise_mm=level, noise_deg=level) for i in range(4)
         ]
     made = report(write(tmp_path / "run", rows))
-    table = list(csv.DictReader(made.tables["cells"].open()))
-    assert list(table[0])[:9] == [
-        *(
-            "scenario",
-            "clearance_mm",
-            "noise",
-            "contact_source",
-            "human_error_scale",
-            "noise_mm",
-            "noise_deg",
-            "tightness",
-            "method",
-        )
-    ]
+    table = list(csv.DictReader(made.tables["conditions"].open()))
     assert [(line["method"], line["noise_mm"], line["trials"], line["successes"]) for line in table] == [
         ("oracle", "0.0", "4", "4"),
         *(("uncorrected", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
     assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
-    (figure,) = [path for path in made.figures if path.name == "success_over_level.png"]
+    (figure,) = [path for path in made.figures if path.name == "success_over_noise_level.png"]
     assert figure.read_bytes().startswith(b"\x89PNG")
     page = pages.lines(made.page)
-    assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
-    assert "| none | 25.0 % 4.6 to 69.9 % n 4 | 25.0 % 4.6 to 69.9 % n 4 |" in page
+    assert "| method, noise level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
+    assert "| uncorrected | 25.0 % 4.6 to 69.9 % n 4 | 25.0 % 4.6 to 69.9 % n 4 |" in page
     assert "| paper | 100.0 % 43.9 to 100.0 % n 3 excluded 1 | 100.0 % 43.9 to 100.0 % n 3 excluded 1 |" in page
-    assert "| stick_in_tower | none | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
+    assert "| stick_in_tower | uncorrected | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
     assert "| all | all | 25 | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
     confusion = list(csv.DictReader(made.tables["confusion"].open()))
     assert [line["method"] for line in confusion] == ["oracle", "uncorrected", "paper", "all"]
@@ -235,7 +201,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
 
 
 def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
-    """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
+    """Drawn if clearances vary."""
     levels = ({"noise_mm": x, "noise_deg": x} for x in (0.0, 0.5, 2.0))
     rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("uncorrected", "paper")]
     rows += [row("paper", clearance_mm=c, contact_source="false-negative") for c in (0.25, 1.0)]
@@ -246,7 +212,7 @@ def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", rows))
     assert {"success_over_tightness.svg", "success_over_tightness.png"} <= {path.name for path in made.figures}
     assert "figure: Success over tightness" in made.page.read_text(encoding="utf-8")
-    table = list(csv.DictReader(made.tables["cells"].open()))
+    table = list(csv.DictReader(made.tables["conditions"].open()))
     assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
     one = report(write(tmp_path / "one", [row(), row("paper")]))
     assert not any("tightness" in path.name for path in one.figures)
@@ -257,34 +223,27 @@ def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: P
     rows = [row("contact", seed=i, success=i < 1) for i in range(4)]
     rows += [row("contact-robust", seed=i, success=i < n, max_reobservations=n) for n in (0, 2, 4) for i in range(4)]
     found = summary(rows, ("contact",))
-    assert [(c.method, c.max_reobservations, c.successes) for c in found.cells] == [
+    assert [(c.method, c.max_reobservations, c.successes) for c in found.results] == [
         *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
     ]
-    assert [(p.place.max_reobservations, p.only_method, p.only_reference) for p in found.pairs] == [
+    assert [(p.condition.max_reobservations, p.only_method, p.only_reference) for p in found.pairs] == [
         (0, 0, 1),
         (2, 1, 0),
         (4, 3, 0),
     ]
-    grouped = members(settings_of_cells(found.cells), found.cells)
+    grouped = members(settings_of_cells(found.results), found.results)
     assert [(s.max_reobservations, [c.method for c in own]) for s, own in grouped.items()] == [
         (n, ["contact", "contact-robust"]) for n in (0, 2, 4)
     ]
     made = report(write(tmp_path / "run", rows))
-    assert {"success_over_looks.svg", "success_over_looks.png"} <= {path.name for path in made.figures}
-    assert "figure: Success over the number of looks" in made.page.read_text(encoding="utf-8")
-    assert made.answer.startswith("`contact-robust` with 4 more looks succeeds in 4 of 4 trials (100.0 %)")
+    assert {"success_over_reobservations.svg", "success_over_reobservations.png"} <= {
+        path.name for path in made.figures
+    }
+    assert "figure: Success over reobservations" in made.page.read_text(encoding="utf-8")
+    assert made.answer.startswith("`contact-robust` with 4 reobservations succeeds in 4 of 4 trials (100.0 %)")
     assert "`contact` succeeds in 1 of the same 4." in made.answer
     one = report(write(tmp_path / "one", [row("contact-robust", max_reobservations=2), row("contact")]))
     assert not any("max_reobservations" in path.name for path in one.figures)
-
-
-def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
-    every = [*STYLES.values(), *OWN_STYLES]
-    assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
-    methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
-    report(write(tmp_path / "run", [row(method) for method in dict.fromkeys(methods)]))
-    drawn = (tmp_path / "run" / "figures" / "success_over_level.svg").read_text(encoding="utf-8")
-    assert all(f">{method}</text>" in drawn for method in methods)
 
 
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
@@ -292,9 +251,9 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
         report(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no finished trial"):
         report(write(tmp_path / "empty", []))
-    with pytest.raises(InputError, match=r"line 2, field schema: it is missing"):
+    with pytest.raises(InputError, match=r"line 2: Object missing required field `schema`"):
         report(write(tmp_path / "bad", [row(), {"seed": 1}]))
-    with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
+    with pytest.raises(InputError, match="record of schema 'apo-bench/row/1'"):
         report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
 
 
@@ -318,9 +277,9 @@ def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() 
     rows = [row("oracle"), row("oracle", 1), row("oracle", success=False, robot_error=wrong)]
     right, other = tally(rows)
     assert [(cell.robot_error, cell.trials, cell.successes) for cell in (right, other)] == [
-        ("uncorrected", 2, 2),
+        ("none", 2, 2),
         (wrong, 1, 0),
     ]
-    both, alone = ("\n".join(cell_table(cells).markdown()) for cells in ((right, other), (right,)))
+    both, alone = ("\n".join(condition_table(cells).markdown()) for cells in ((right, other), (right,)))
     assert wrong in both
     assert "robot" not in alone

@@ -31,11 +31,11 @@ def rows(seeds: int = 12, scenarios: int = 1) -> list[dict[str, Any]]:
 
 def test_it_holds_every_part() -> None:
     found = summary(rows(40))
-    assert len(found.cells) == 12
-    assert {(p.place.method, p.reference) for p in found.pairs} == {
+    assert len(found.results) == 12
+    assert {(p.condition.method, p.reference) for p in found.pairs} == {
         ("uncorrected", "paper"), ("paper", "uncorrected"), ("contact", "uncorrected"), ("contact", "paper")
     }  # fmt: skip
-    assert [h.place.method for h in found.half_levels] == ["uncorrected", "contact", "paper"]
+    assert [h.condition.method for h in found.half_levels] == ["uncorrected", "contact", "paper"]
     levels = [h.noise_mm or np.nan for h in found.half_levels]
     assert levels == pytest.approx([0.2, 3.0, 1.5], rel=0.6) or found.half_levels[0].beyond == "below"
 
@@ -56,7 +56,7 @@ def test_other_references() -> None:
 
 
 def test_without_rows_there_is_nothing() -> None:
-    assert summary([]).cells == summary([]).pairs == summary([]).half_levels == ()
+    assert summary([]).results == summary([]).pairs == summary([]).half_levels == ()
 
 
 def test_ten_thousand_rows_take_a_second_or_two() -> None:

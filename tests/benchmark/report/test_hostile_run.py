@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ from apo_bench import InputError
 from apo_bench.benchmark.analysis import tally
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
-from apo_bench.cli.terminal import print_cells
+from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
 from apo_bench.records.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command
@@ -114,20 +113,20 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
     assert all(evil in pages.lines(page) for evil in DANGEROUS)
     assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 0
     assert "<script>alert" not in (tmp_path / "made" / "compare.html").read_text(encoding="utf-8")
-    print_cells(tally(rows))
+    print_rates(tally(rows))
     assert "[/red]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["scenario", "method"])
-@pytest.mark.parametrize("evil", ["two\nlines", "\x1b[201~rm", "\u202etxt"])
+@pytest.mark.parametrize("evil", ["two\nlines", "\u202etxt"])
 def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"line 1, field {name}: text without control characters is needed"):
+    with pytest.raises(InputError, match=f"line 1, field {name}: control characters are not allowed"):
         report(write(tmp_path / "run", [row("contact") | {name: evil}]))
 
 
 def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert clean("a\x1b[2J\nb\x07\x9b\u202e\ud800é") == "a\\x1b[2J\\nb\\x07\\x9b\\u202e\\ud800é"
-    print_cells(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
+    print_rates(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
     assert cli.main(["report", str(tmp_path / "no\x1b[31mwhere")]) == 2
     said = capsys.readouterr()
     for text in (said.out, said.err):
@@ -137,20 +136,19 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
-    from apo_bench.cli.trial_text import print_row
+    from apo_bench.cli.shared import print_columns
     from apo_bench.trial.endings import end_record
+    from apo_bench.viz.trial_text import summary_lines
 
     end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
-    print_row(row("contact", 0, False, pose_source="noise-model") | end)
+    print_columns(summary_lines(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"
     folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
     assert [one["sentence"] for one in read_records(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
-@pytest.mark.parametrize(
-    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
-)
+@pytest.mark.parametrize("name", ["report.html", "tables", "tables/conditions.csv"])
 def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
     folder = write(tmp_path / "run", [row("contact")])
     target = tmp_path / "target"
@@ -162,7 +160,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
     assert list(target.iterdir()) == [] if target.is_dir() else target.read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json", "torn.txt"])
+@pytest.mark.parametrize("name", ["trials.jsonl", "torn.txt"])
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
     from apo_bench.records.run.run_folder import RunFolder
 
@@ -176,20 +174,3 @@ def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None
     with pytest.raises(InputError, match="is a symbolic link"):
         RunFolder(folder, {})
     assert target.read_bytes() == b""
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
-@pytest.mark.parametrize(
-    ("name", "kind"), [("trials.jsonl", "a pipe"), ("run.json", "a device"), ("timing.jsonl", "a folder")]
-)
-def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path) -> None:
-    folder = write(tmp_path / "run", [row("contact")])
-    (folder / name).unlink(missing_ok=True)
-    if kind == "a pipe":
-        os.mkfifo(folder / name)
-    elif kind == "a folder":
-        (folder / name).mkdir()
-    else:
-        (folder / name).symlink_to("/dev/zero")
-    with pytest.raises(InputError, match=f"{name}: {kind} was given; give a"):
-        report(folder)

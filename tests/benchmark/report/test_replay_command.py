@@ -92,7 +92,7 @@ def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == [
         *(
             "apo-bench",
-            "replay",
+            "run",
             "my dir/tower.toml",
             "--noise-mm",
             "0.1",
@@ -115,8 +115,8 @@ def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
         *("--seed", "9"),
     ]
     seen = row("contact", 1, noise_mm=0.5, noise_deg=0.0, noise="depth-camera", pose_source="depth-camera")
-    shown = "apo-bench run stick_in_tower --noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
-    assert replay_command(seen) == shown
+    given = "--noise-level 0.5 --clearance-mm 0.25 --pose-source depth-camera --method contact --seed 1"
+    assert replay_command(seen) == f"apo-bench run stick_in_tower {given}"
 
 
 @pytest.mark.parametrize("x", [0.1, 0.25, 1.0, 3.0, 1e-7, 0.30000000000000004, 12345.678])

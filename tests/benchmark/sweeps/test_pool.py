@@ -19,7 +19,7 @@ import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, run_sweep
 from apo_bench.benchmark.sweeps import pool
-from apo_bench.benchmark.sweeps.stopping import Stopped, stoppable
+from apo_bench.benchmark.sweeps.stopping import Stopped, stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Worker
 from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
@@ -312,12 +312,12 @@ def test_signals_raise_and_handlers_of_the_callers_own_stay() -> None:
 
     before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
-        with stoppable(), pytest.raises(Stopped) as stopped:
+        with stop_at_signals(), pytest.raises(Stopped) as stopped:
             signal.raise_signal(signal.SIGTERM)
         assert stopped.value.number == signal.SIGTERM
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
         signal.signal(signal.SIGTERM, mine)
-        with stoppable():
+        with stop_at_signals():
             assert signal.getsignal(signal.SIGTERM) is mine
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, InputError, Observation, correct
-from apo_bench.assembly import Equations, Step, Try, largest_gap
+from apo_bench.assembly import Step, Try, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.paper import paper
-from apo_bench.correction.solvers.newton import LENGTH_M, Solution, solve_newton
+from apo_bench.correction.solvers.newton import LENGTH_M, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
 from apo_bench.records import CODES
 from tests import scenes
@@ -108,15 +108,6 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
         assert is_rigid(found.poses).all()
 
 
-def test_the_trace_ends_at_rest() -> None:
-    scene = scenes.stick_on_castles()
-    found = paper(scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 2.0, 2.0)))
-    assert found.trace[0].gap_m == found.gap_before_m
-    assert found.trace[-1].gap_m == found.gap_after_m
-    assert found.trace[-1].step < 1e-9
-    assert 3 <= len(found.trace) <= 6
-
-
 def test_the_world_frame_does_not_matter() -> None:
     scene = scenes.stick_in_tower()
     goals = scenes.noisy(scene.goals, np.random.default_rng(2), 2.0, 1.0)
@@ -178,17 +169,6 @@ def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
     assert found.gap_before_m == found.gap_after_m == largest_gap(scene.assembly, scene.start, goals)
 
 
-def test_a_solver_that_runs_out_of_turns_has_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
-    def hurried(system: Equations, goals: Array, free: Collection[int]) -> Solution:
-        return solve_newton(system, goals, free, iterations=1)
-
-    monkeypatch.setattr("apo_bench.correction.baselines.paper.solve_newton", hurried)
-    scene = scenes.stick_on_castles()
-    found = paper(scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(0), 9.0, 9.0)))
-    assert (found.status, found.sentence) == ("not_converged", CODES["not_converged"])
-    assert len(found.trace) == 2
-
-
 def test_numbers_that_overflow_are_not_finite() -> None:
     scene = scenes.stick_on_castles()
     goals = scene.goals.copy()
@@ -241,22 +221,6 @@ def test_a_goal_that_is_no_candidate_is_settled_for_what_it_makes() -> None:
     assert_allclose(found.poses[3, 2], [0, 0, 1, 0.025], atol=1e-9)
     assert_allclose(found.poses[3, :2, 3], goals[3, :2, 3], atol=1e-4)
     assert np.degrees(np.arctan2(*found.poses[3, [1, 0], 0])) == pytest.approx(3.0, abs=1e-3)
-
-
-def test_a_tilt_above_the_threshold_makes_a_candidate() -> None:
-    scene = scenes.fixture()
-    assert paper(scenes.seen(scene, tilted(scene, 3, 0.2, 0.0))).freed == (3,)
-
-
-@pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])
-def test_settling_opens_no_contact_that_held(name: str) -> None:
-    """Levels about the threshold, where a goal that is put right can put a later one wrong."""
-    scene = scenes.ALL[name]()
-    rng = np.random.default_rng(5)
-    for level in np.repeat([0.01, 0.02, 0.03, 0.05], 10):
-        found = paper(scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level)))
-        assert found.ok
-        assert found.gap_after_m <= 1e-4
 
 
 # correct(): any corrector, by name or as an object
@@ -323,8 +287,6 @@ def returning(**changed: Any) -> Callable[[Observation], Correction]:
     ("changed", "message"),
     [
         ({"schedule": "1 2 3"}, "schedule of Correction must be a list (each entry a Step), got '1 2 3'"),
-        ({"freed": (99, -5)}, "returned the operation 99 in `freed`; return whole numbers from 0 to 2"),
-        ({"gap_after_m": None}, "gap_after_m of Correction must be a number, got None"),
         ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
         (
             {"schedule": steps("1 2 3"), "step_poses": np.tile(np.eye(4), (3, 1, 1))},
@@ -347,14 +309,10 @@ def other_status(seen: Observation) -> Correction:
     ("given", "message"),
     [
         ("papr", "unknown corrector 'papr'; did you mean 'paper'"),
-        ("no_such_module:f", "cannot be imported"),
         (lambda seen: None, "returned None; return a Correction or poses of shape (3, 4, 4)"),
-        (lambda seen: seen.poses[:2], "returned an array of shape (2, 4, 4)"),
         (reflected, "the pose of operation 2 that the corrector 'reflected' returned is not a rigid pose"),
         (other_status, "returned the status 'fine'; return one of converged, not_seen"),
         (scheduled("1 2"), "returned a schedule that leaves operation 3 undone; do operations in order"),
-        (scheduled("1 2 4"), "returned a schedule that names operation 4, where 3 are known"),
-        (scheduled("1 -2 2 3"), "returned a schedule that undoes operation 2, which is not done"),
         (scheduled("1 2 3 -2"), "returned a schedule that undoes operation 2 before operation 3"),
         (
             scheduled("1 2 3", mirrored=True),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from itertools import permutations
 
 import numpy as np
@@ -22,7 +21,6 @@ ONLY_HAND_EYE = Sigmas(hand_eye=(1.0, 0.2))
 FREE = np.repeat([1e-3, np.radians(1.0)], 3)
 """A part that may have moved any way in the hand."""
 HELD = pose.at((0.0, 0.01, 0.02), (0.0, 90.0, 20.0))
-CORNERS = np.array([[-0.04, -0.02, -0.01], [0.04, -0.02, -0.01], [-0.04, 0.02, -0.01], [0.04, 0.02, -0.01]])
 
 
 def jacobian(seed: int = 0) -> np.ndarray:
@@ -98,27 +96,6 @@ def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
     assert deviations[5] == pytest.approx(np.radians(0.2), rel=1e-3)
 
 
-def test_laying_flush_tells_height_and_tilts_in_the_hand_alone() -> None:
-    gamma = np.array([0.4e-3, -0.7e-3, 0.9e-3, 0.01, -0.006, 0.012])
-    belief = prior_estimate(Sigmas(), 0, MIDDLE).grasp(1, FREE)
-    held = pose.at((0.0, 0.0, 0.02))
-    lying = pose.exp(gamma) @ held
-    # the hand is turned until the bottom of the part is level, its lowest face at z = 0
-    T_world_part = pose.at((0.5, 0.1, 0.01))
-    tip = T_world_part @ pose.inverse(lying)
-    corners = [Touch(tip, UP, 0.0, v, 1e-9, None, 1, held) for v in CORNERS[:3]]
-    belief = belief.touch(*corners)
-    told = belief.held(1, held)
-    assert_allclose((tip @ told)[2], T_world_part[2], atol=1e-6)
-    D = belief.covariance_of(tip, None, 1, held)
-    deviations = np.sqrt(np.diag(D))
-    assert deviations[[2, 3, 4]].max() < 1e-6
-    assert deviations[[0, 1]].min() > 0.9e-3
-    assert deviations[5] > 0.9 * np.radians(1.0)
-    # what no touch tells stays as it was believed
-    assert_allclose(belief.mean[9:][[0, 1, 5]], 0.0, atol=2e-4)
-
-
 def test_the_order_of_touches_does_not_matter() -> None:
     E = displaced(np.array([0.3e-3, 0.5e-3, -0.9e-3, 2e-3, 3e-3, -1e-3]))
     touches = [touch_of(E, at, 5e-5) for at in around()] + [touch_of(E, (0.5, 0.1), 5e-5, off_m=3e-3)]
@@ -135,22 +112,6 @@ def test_the_order_of_touches_does_not_matter() -> None:
             assert belief.refused == first.refused
 
 
-def test_the_same_touch_again_halves_the_variance() -> None:
-    vague = Sigmas(hand_eye=(20.0, 0.0))
-    touch = touch_of(np.eye(4), (0.5, 0.1), 1e-5)
-    variances = [prior_estimate(vague, 0, MIDDLE).touch(*n * [touch]).covariance[2, 2] for n in (1, 2, 4)]
-    assert_allclose(variances, np.array([1.0, 0.5, 0.25]) * 1e-10, rtol=1e-5)
-
-
-def test_what_is_known_exactly_stays_so() -> None:
-    belief = prior_estimate(ONLY_HAND_EYE, 6, MIDDLE).grasp(0, slip_sigmas(Sigmas(in_hand=(0.5, 1.0))))
-    lying = [Touch(DOWN, UP, 0.3005, v, 1e-5, jacobian(), 0, HELD) for v in CORNERS]
-    belief = belief.touch(*lying)
-    exact = [*range(6, 15), 15, 19, 20]
-    assert_array_equal(belief.mean[exact], 0.0)
-    assert_array_equal(belief.covariance[exact], 0.0)
-
-
 def test_a_grasp_made_anew_forgets_the_part_and_keeps_the_robot() -> None:
     belief = taught()
     anew = belief.grasp(3, slip_sigmas(UNKNOWN))
@@ -159,15 +120,6 @@ def test_a_grasp_made_anew_forgets_the_part_and_keeps_the_robot() -> None:
     assert_allclose(anew.touch().mean[:21], belief.mean, atol=1e-12)
     assert_allclose(np.sqrt(np.diag(anew.covariance)[21:]), slip_sigmas(UNKNOWN))
     assert anew.touches == belief.touches
-
-
-def test_a_shared_error_cancels_between_places() -> None:
-    """Two places of one part at one turn: hand-eye shift and tool are the same there."""
-    belief = prior_estimate(Sigmas(hand_eye=(1.0, 0.0), tool_mm=0.5), 0, MIDDLE)
-    there = pose.at((0.1, 0.0, 0.0)) @ DOWN
-    apart = belief.jacobian_of(DOWN) - belief.jacobian_of(there)
-    assert_allclose(apart @ belief.covariance @ apart.T, 0.0, atol=1e-18)
-    assert_allclose(np.diag(belief.covariance_of(DOWN))[:3], 1.25e-6)
 
 
 def test_joints_are_told_through_the_jacobian() -> None:
@@ -183,14 +135,6 @@ def test_joints_are_told_through_the_jacobian() -> None:
             Touch(B, n, n @ (B @ pose.exp(jacobian(seed) @ delta))[:3, 3], np.zeros(3), 1e-7, jacobian(seed))
         )
     assert_allclose(prior.touch(*touches).mean[9:15], delta, atol=1e-6)
-
-
-def test_a_belief_survives_pickling() -> None:
-    belief = taught()
-    again = pickle.loads(pickle.dumps(belief))
-    assert_array_equal(again.mean, belief.mean)
-    assert_array_equal(again.touch().mean, belief.touch().mean)
-    assert not again.mean.flags.writeable
 
 
 def test_wrong_requests_get_one_sentence() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench import ContactCorrector, correct
+from apo_bench import correct
 from apo_bench.assembly import faces_away, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import compact_equations
@@ -48,15 +48,6 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
         assert found.ok
         assert length(seen, found.poses) <= length(seen, layout.poses)
         assert largest_gap(seen.assembly, seen.start, found.poses) <= seen.gap_m
-
-
-def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
-    for name in ("bridge_cycle", "carried_bridge"):
-        seen = look(name, 1, 4.0)
-        one = correct(seen, "contact")
-        other = correct(seen, ContactCorrector(elsewhere=False))
-        assert one.poses.tolist() == other.poses.tolist()
-        assert one.sentence == other.sentence
 
 
 def test_where_contacts_bend_newton_ends_where_small_steps_would():

@@ -29,11 +29,6 @@ def _observation() -> Observation:
     return look("stick_in_tower", 0)
 
 
-def test_of_one_hypothesis_it_is_its_own(observation):
-    only = of(observation, 1.0)
-    np.testing.assert_allclose(mode_covariance((only,)), only.covariance, rtol=1e-12, atol=ROUNDING)
-
-
 def test_of_a_mode_it_is_the_second_moment_about_the_goals_of_the_first(observation):
     off = np.array([2e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
     found = mode_covariance((of(observation, 0.75), of(observation, 0.25, off, 2.0 * SIGMA)))

@@ -7,13 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import InputError, correct
-from apo_bench.assembly import OutlierModel
-from apo_bench.correction.robust.beliefs import GROSS, INLIER
-from apo_bench.correction.robust.views import beliefs, merged, views_of
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
-
-MODEL = OutlierModel()
 
 
 class Again:
@@ -79,34 +74,6 @@ def test_an_operation_of_which_nothing_is_told_is_asked_for():
     assert correct(missed, "contact-robust", again).ok
     assert again.asked == [(0,)]
     assert correct(missed, "contact-robust", Again()).status == "not_seen"
-
-
-def test_a_corrector_that_does_not_ask_gets_nothing():
-    observation = astray(look("block_on_block", 1), 1)
-    again = Again(at_the_same_place("block_on_block", 1, 0))
-    for corrector in ("contact", lambda seen: seen.poses):
-        correct(observation, corrector, again)
-    assert again.asked == []
-
-
-def test_views_that_agree_are_merged_and_believed():
-    one, other = (views_of(at_the_same_place("carried_bridge", 4, i))[0][0] for i in range(2))
-    both = merged((one, other), (INLIER, INLIER), MODEL)
-    assert_allclose(both.covariance, one.covariance / 2, rtol=1e-9)
-    middle = one.goal @ pose.exp(pose.log(pose.inverse(one.goal) @ other.goal) / 2)
-    assert_allclose(both.goal, middle, atol=1e-6)
-    assert beliefs((one, other), MODEL)[0][1] == (INLIER, INLIER)
-    alone = merged((one, other), (INLIER, GROSS), MODEL)
-    assert alone.surprise - both.surprise > 20.0
-
-
-def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
-    one = views_of(look("carried_bridge", 4))[0][0]
-    other = one._replace(goal=one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]))
-    independent = OutlierModel(repeat=0.0)
-    assert [state for _, state in beliefs((one, other), independent)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
-    many = beliefs((one, other, one, one, other, one), MODEL)
-    assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)
 
 
 def test_anything_but_a_reobserver_is_refused():

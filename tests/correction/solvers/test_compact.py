@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -15,7 +13,7 @@ from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
 from apo_bench.geometry import Array, pose
 from tests import scenes
-from tests.assembly.test_equations import long_words, random_scene
+from tests.assembly.test_equations import random_scene
 
 pytestmark = pytest.mark.numeric
 
@@ -49,13 +47,6 @@ def check_same(scene: scenes.Scene, moved: Array) -> None:
 def test_normal_equations_of_random_assemblies(seed: int) -> None:
     scene = random_scene(seed)
     check_same(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 20.0, 20.0))
-
-
-@pytest.mark.parametrize("build", [long_words, scenes.pockets])
-def test_normal_equations_of_examples(build: Callable[[], scenes.Scene]) -> None:
-    """In long words a motion parameter occurs twice."""
-    scene = build()
-    check_same(scene, scenes.noisy(scene.goals, np.random.default_rng(0), 5.0, 5.0))
 
 
 @given(SEEDS)

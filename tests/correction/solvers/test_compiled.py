@@ -65,27 +65,6 @@ def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float
 
 
 @pytest.mark.numeric
-def test_soft_contacts_are_the_same_too() -> None:
-    for seed in range(3):
-        system, goals, L = drawn("vanished_fixture", 2.0, 1.0, seed)
-        soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
-        alike(nearest_goals(system, goals, L, soft_m), by_kernels(system, goals, L, soft_m), 1e-12)
-
-
-@pytest.mark.numeric
-@pytest.mark.parametrize("own_points", [False, True])
-def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> None:
-    draws = [drawn("stick_on_castles", 5.0, 3.0, seed) for seed in range(6)]
-    goals = np.array([d[1] for d in draws])
-    L = np.array([d[2] for d in draws])
-    system = draws[0][0]
-    if own_points:
-        points = np.array([d[0].points for d in draws]) * np.arange(1.0, 7.0)[:, None, None, None]
-        system = replace(system, points=points)
-    alike(nearest_goals(system, goals, L), by_kernels(system, goals, L), 1e-11)
-
-
-@pytest.mark.numeric
 def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
@@ -96,18 +75,6 @@ def test_what_is_not_finite_is_said_and_left_alone() -> None:
     assert np.array_equal(found.goals[1], three[1], equal_nan=True)
     assert not found.z[1].any()
     assert np.array_equal(found.goals[0], by_kernels(system, goals, L).goals)
-
-
-def test_contradictory_contacts_end_with_a_gap() -> None:
-    """There is no point to rest on: the plain solver's own end depends on the order of the contacts."""
-    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, 0)
-    plane = system.plane.copy()
-    plane[-1, 3] += 3e-3
-    for nearest in (nearest_goals, by_kernels):
-        found = nearest(replace(system, plane=plane), goals, L)
-        assert bool(found.finite)
-        assert np.abs(found.e).max() > 1e-4
-        assert np.isfinite(found.goals).all()
 
 
 def observed(name: str, mm: float, degrees: float, seed: int, play_m: float = 0.0) -> Observation:

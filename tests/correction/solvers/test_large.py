@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.sparse import csr_array
 
 from apo_bench import Assembly, correct
@@ -97,18 +96,6 @@ def test_sparse_is_dense(name: str, way: str) -> None:
     assert np.abs(large.e).max() <= 1e-12
 
 
-@pytest.mark.parametrize("name", ["chain3", "hub"])
-def test_sparse_is_dense_for_soft_contacts(name: str, way: str) -> None:
-    system, seen, L = drawn(name)
-    soft_m = np.random.default_rng(1).uniform(0.1e-3, 1e-3, 3 * len(system))
-    soft_m[:3] = 0.0
-    large = nearest_goals_sparse(system, seen, L, soft_m)
-    small = nearest_goals(system, seen[None], L, soft_m)
-    assert large.at_rest
-    assert_allclose(large.z, small.z[0], rtol=0, atol=1e-5)
-    assert_allclose(large.e, small.e[0], rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("name", SMALL)
 @pytest.mark.parametrize("few", [0, 10**9])
 def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,23 +117,6 @@ def test_what_a_sparse_matrix_leaves_free_is_what_its_singular_vectors_say(name:
     assert known is not None
     assert_allclose(free.T @ free, np.eye(len(Jt) - SMALL[name][1]), rtol=0, atol=1e-12)
     assert_allclose(free @ free.T, known.free @ known.free.T, rtol=0, atol=1e-9)
-
-
-def test_a_rank_that_is_not_clear_is_left_to_dense_matrices() -> None:
-    """Columns that are nearly parallel: their difference is neither rounding nor beyond doubt."""
-    Jt = np.eye(12)[:, :4]
-    Jt[0, 1], Jt[1, 1] = 1.0, 1e-6
-    assert sparse.free_basis(csr_array(Jt), *posterior.UNCLEAR) is None
-    assert sparse.free_basis(csr_array(np.zeros((12, 4))), *posterior.UNCLEAR) is None
-    (rank,), P = posterior.projections([csr_array(Jt)])
-    assert rank == 4
-    assert P is not None
-    assert_allclose(P[0], np.diag([0.0] * 4 + [1.0] * 8), rtol=0, atol=1e-9)
-
-
-def test_rank_of_nothing() -> None:
-    for shape in ((0, 0), (6, 0), (12, 3)):
-        assert sparse.sparse_rank(csr_array(shape)) == posterior.jacobian_rank(np.zeros(shape)) == 0
 
 
 def test_a_thousand_blocks_on_one_plate() -> None:
@@ -173,18 +143,6 @@ def test_the_corrector_takes_many_operations_whole() -> None:
     assert made.test.freedom == made.rank
     assert 0.0 < made.test.p_value < 1.0
     assert made.covariance is None
-
-
-def test_numbers_that_are_not_finite() -> None:
-    system, seen, L = drawn("grid3")
-    seen = np.array(seen)
-    seen[5, 0, 3] = np.nan
-    with np.errstate(invalid="ignore"):
-        found: Any = nearest_goals_sparse(system, seen, L)
-    assert not found.finite
-    assert not found.at_rest
-    assert_array_equal(found.goals, seen)
-    assert_array_equal(found.z, np.zeros(6 * len(seen)))
 
 
 def test_rounding_does_not_stop_the_banded_solver() -> None:

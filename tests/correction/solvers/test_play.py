@@ -1,21 +1,16 @@
 """Play adds up along what is carried, faces of one fit are off together, and the test of a correction knows both."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from apo_bench import Demonstration, correct, correct_many, observe
+from apo_bench import Demonstration, correct_many, observe
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.chi_square import fit_deviation, softened_chi_square
+from apo_bench.correction.checks.chi_square import fit_deviation
 from apo_bench.correction.contact.contact import contact_refuse
-from apo_bench.correction.contact.problem import problem_of
-from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.play import fit_covariance, plays
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from benchmarks import corrector_problems
-from tests.correction.robust.test_robust import look, shown
+from tests.correction.robust.test_robust import shown
 
 PLAY_M = 0.25e-3
 
@@ -62,30 +57,6 @@ def test_faces_that_look_opposite_ways_are_off_by_the_same():
     other = number["stick.nz on castle2.sfl"]
     assert (S[up, up], S[up, down], S[down, slot]) == pytest.approx((1.0, -1.0, 1.0))
     assert S[slot, other] == pytest.approx(2.0)
-
-
-def test_many_operations_that_fit_are_corrected():
-    """Ten operations: equations are sparse, what play does to them together is not."""
-    of = corrector_problems.chain(6)
-    ten = of._replace(assembly=replace(of.assembly, operations=of.assembly.operations[:-1]), poses=of.poses[:10])
-    found = correct(replace(corrector_problems.observe(ten, 0), play_m=PLAY_M), "contact")
-    assert found.ok
-    assert found.test.passes
-
-
-def test_the_length_that_play_leaves_is_that_of_soft_contacts():
-    """Linear where play is: a quarter of a millimetre bends contacts of centimetres by some permille."""
-    for name in ("stick_in_tower", "pocket_table"):
-        seen = replace(look(name, 0), play_m=PLAY_M)
-        asked = problem_of((seen,))
-        system = asked.laid.system.only(0)
-        slack_m = fit_deviation(seen.assembly, seen.play_m)
-        exact = nearest_goals(system, seen.poses, asked.L[0])
-        soft = nearest_goals(system, seen.poses, asked.L[0], slack_m)
-        over = soft.e[slack_m > 0.0] / slack_m[slack_m > 0.0]
-        S = np.diag(slack_m**2)
-        short = float(softened_chi_square(exact.z[None], exact.Jt[None], S)[0])
-        assert short == pytest.approx(float(soft.z @ soft.z + over @ over), rel=5e-3)
 
 
 def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Correction, Observation, correct, correct_many
-from apo_bench.assembly import Operation
+from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
@@ -68,18 +67,6 @@ def test_observations_together_have_the_rank_and_the_projection_of_each() -> Non
     assert alone == rank
 
 
-def test_freedom_of_nothing() -> None:
-    for shape in ((12, 0), (0, 0)):
-        known = freedom_of(np.zeros(shape))
-        assert known is not None
-        assert (known.rank, known.redundant, known.spectral_gap) == (0, 0, np.inf)
-        assert_allclose(known.free, np.eye(shape[0]), rtol=0, atol=0)
-    assert freedom_of(np.zeros((606, 3))) is None
-    full = freedom_of(np.eye(6)[:, :4])
-    assert full is not None
-    assert (full.rank, full.redundant, full.spectral_gap) == (4, 0, np.inf)
-
-
 @pytest.mark.parametrize(("name", "correlated"), [("stick_in_tower", False), ("pockets", True)])
 def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> None:
     """Errors of corrected goals over 400 draws; what is stated to be fixed is fixed."""
@@ -119,64 +106,6 @@ def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, h
     assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
-
-
-def test_only_free_directions_count() -> None:
-    """Off along the free x of the stick the truth is outside from some sigmas on; off the table it is not looked at."""
-    scene = scenes.stick_in_tower()
-    L = scales(3, 1.0, 1.0)
-    seen = look(scene, L, 0)
-    made = correct(seen, "contact")
-    assert contains_truth(seen, made, made.poses)
-    for mm, expected in ((1.0, True), (12.0, False), (-12.0, False)):
-        aside = np.array(made.poses)
-        aside[2] = aside[2] @ scenes.mm(mm, 0, 0)
-        assert contains_truth(seen, made, aside) is expected
-    lifted = np.array(made.poses)
-    lifted[:, 2, 3] += 0.012
-    assert contains_truth(seen, made, lifted)
-
-
-def test_what_was_left_out_no_longer_fixes_anything() -> None:
-    """Lifted out of its slots the stick is outside only if nothing holds it there."""
-    scene = scenes.stick_on_castles()
-    L = scales(3, 1.0, 1.0)
-    seen = look(scene, L, 0)
-    made = correct(seen, "contact")
-    lifted = np.array(made.poses)
-    lifted[2] = lifted[2] @ scenes.mm(0, 0, 12)
-    for dropped, expected in (((), True), (("R3",), True), (("R3", "R4"), False)):
-        assert contains_truth(seen, replace(made, dropped=dropped), lifted) is expected
-
-
-def pocketed() -> scenes.Scene:
-    """A block in a pocket: nothing is free."""
-    contacts = scenes.touch("block", "table", *scenes.pocket("A"))
-    parts = [scenes.table_with_pockets(), scenes.block()]
-    return scenes.scene(parts, [Operation("block", contacts)], [scenes.mm(-60, 150, 19)])
-
-
-def test_where_there_is_no_region_there_is_no_answer() -> None:
-    scene = scenes.stick_in_tower()
-    L = scales(3, 1.0, 1.0)
-    seen = look(scene, L, 0)
-    assert contains_truth(seen, correct(seen, "paper"), scene.goals) is None
-    unseen = replace(seen, observed=np.array([True, True, False]))
-    assert contains_truth(unseen, correct(unseen, "contact"), scene.goals) is None
-    made = correct(seen, "contact")
-    assert contains_truth(seen, replace(made, status="doubtful"), scene.goals) is None
-    assert contains_truth(seen, replace(made, covariance=None), scene.goals) is None
-
-
-def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -> None:
-    scene = pocketed()
-    seen = look(scene, scales(1, 1.0, 1.0), 0)
-    made = correct(seen, "contact")
-    assert (made.ok, made.rank) == (True, 6)
-    assert_allclose(made.poses, scene.goals, rtol=0, atol=1e-12)
-    assert made.covariance is not None
-    assert np.abs(made.covariance).max() <= 1e-20
-    assert contains_truth(seen, made, scene.goals) is None
 
 
 @pytest.mark.parametrize("free", [1, 9])

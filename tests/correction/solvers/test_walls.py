@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import nnls
 
-from apo_bench import Assembly, ContactCorrector, InputError, Observation, correct
-from apo_bench.assembly import Contact, Gap, Operation
+from apo_bench import Assembly, Observation, correct
+from apo_bench.assembly import Contact, Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Array, pose, right_jacobian
 from tests import scenes
-from tests.correction.solvers.test_large import fence
 from tests.correction.solvers.test_manifold import correction, crooked, scales, twisted
 
 SIDES = {"stick_on_castles": ("spy", "sny"), "pockets": ("px", "nx", "py", "ny")}
@@ -103,53 +100,6 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
     assert touched > 0
 
 
-def test_a_part_that_was_seen_between_its_walls_stays() -> None:
-    """Nothing but walls: a block seen 0.4 mm above the table, and one seen 3 mm above it."""
-    scene = scenes.scene(
-        [scenes.table(), scenes.block()],
-        [Operation("block", scenes.touch("block", "table", "nz-top"))],
-        [scenes.mm(0, 0, 25)],
-    )
-    gaps = {scene.assembly.operations[0].contacts[0]: Gap("clearance", -1e-3, 1e-3)}
-    assembly = replace(scene.assembly, gaps=gaps)
-    L = scales(1, 2.0, 1.0)
-    inside = look(assembly, scene, np.array([scenes.mm(3, 4, 25.4)]), L)
-    made = correct(inside, "contact")
-    assert (made.ok, made.rank) == (True, 0)
-    assert_array_equal(made.poses, inside.poses)
-    above = look(assembly, scene, np.array([scenes.mm(3, 4, 28)]), L)
-    assert_allclose(correct(above, "contact").poses, [scenes.mm(3, 4, 26)], rtol=0, atol=1e-9)
-    below = look(assembly, scene, np.array([scenes.mm(3, 4, 15)]), L)
-    assert_allclose(correct(below, "contact").poses, [scenes.mm(3, 4, 24)], rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize("method", ["contact", ContactCorrector(compiled=False)], ids=["as it comes", "plain"])
-def test_contact_puts_parts_that_fit_one_play_lower(method: Any) -> None:
-    """Compiled where that can be, and as it is without Numba."""
-    play_mm = 0.25
-    scene = scenes.stick_on_castles()
-    L = scales(3, 2.0, 1.0)
-    floors = [c for c in scene.assembly.operations[2].contacts if c.environment.face == "sfl"]
-    assembly = replace(scene.assembly, gaps={c: Gap("contact") for c in floors})
-    goals = twisted(scene.goals, L, np.random.default_rng(3))
-    made = correct(look(assembly, scene, goals, L, 1e-3 * play_mm), method)
-    assert (made.ok, made.rank) == (True, 13)
-    assert_allclose(made.poses[2, 2, 3], 0.04 - 1e-3 * play_mm, rtol=0, atol=1e-12)
-    assert made.gap_after_m <= 1e-12
-    assert made.gap_before_m > 1e-4
-    centred = correct(look(scene.assembly, scene, goals, L, 1e-3 * play_mm), method)
-    assert_allclose(centred.poses[2, 2, 3], 0.04, rtol=0, atol=1e-12)
-
-
-def test_clearance_without_numbers_is_the_play() -> None:
-    scene = scenes.stick_on_castles()
-    L = scales(3, 2.0, 1.0)
-    goals = twisted(scene.goals, L, np.random.default_rng(5))
-    play = look(walled(scene, "stick_on_castles", Gap("clearance")), scene, goals, L, 0.5e-3)
-    said = look(walled(scene, "stick_on_castles", Gap("clearance", -0.5e-3, 0.5e-3)), scene, goals, L, 0.5e-3)
-    assert_array_equal(correct(play, "contact").poses, correct(said, "contact").poses)
-
-
 @pytest.mark.parametrize("intervals_mm", [((1.0, 2.0), (0.0, 1.0)), ((-9.0, -8.0), (-9.0, 0.0))])
 def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tuple[float, float]]) -> None:
     """Both sides of a stick as wide as its slot: their distances add up to nothing."""
@@ -165,13 +115,3 @@ def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tupl
         assert made.status == "inconsistent"
         assert made.covariance is None
         assert made.gap_after_m > seen.gap_m
-
-
-def test_walls_of_very_many_operations_are_refused() -> None:
-    scene = fence(101)
-    gaps = {scene.assembly.operations[5].contacts[1]: Gap("clearance", -1e-3, 1e-3)}
-    with pytest.raises(InputError) as error:
-        correct(scenes.seen(scenes.Scene(replace(scene.assembly, gaps=gaps), scene.start, scene.goals), scene.goals))
-    assert str(error.value) == (
-        'walls with 101 operations were given, up to 100 are allowed; ask for "centred" contacts instead.'
-    )

@@ -185,7 +185,7 @@ def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.C
     out = tmp_path / "eye.png"
     assert main(["inspect", "depth", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
     form = json.loads(capsys.readouterr().out)
-    assert form["schema"] == "apo-bench/eye/1"
+    assert form["schema"] == "apo-bench/depth/1"
     assert [operation["found"] for operation in form["operations"]] == [True, True]
     assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"

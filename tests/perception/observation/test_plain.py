@@ -13,7 +13,7 @@ from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.plain import Plain
-from apo_bench.viz.noise_card import Drawn, find_facts, list_models, write_card
+from apo_bench.viz.noise_sheet import ErrorSample, find_facts, list_models, noise_sheet
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -64,7 +64,10 @@ def test_a_class_made_with_a_level_may_be_plain_too() -> None:
     ("given", "message"),
     [
         (lifted, "whose deviation_mm is None; set lifted.deviation_mm to a number from 0 to 10000"),
-        (with_deviations(lifted, 1.0, "2"), "whose deviation_deg is '2'; set noise.deviation_deg to a number from 0 to 180"),
+        (
+            with_deviations(lifted, 1.0, "2"),
+            "whose deviation_deg is '2'; set noise.deviation_deg to a number from 0 to 180",
+        ),
     ],
 )
 def test_declarations_that_are_missing_or_make_no_sense(given, message: str) -> None:
@@ -128,7 +131,7 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
 def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
     errors = np.zeros((5, 4))
     errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 7.0]
-    text = write_card("isotropic", NOISE_LEVEL, Drawn(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
+    text = noise_sheet("isotropic", NOISE_LEVEL, ErrorSample(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
     across = next(line for line in text.splitlines() if line.startswith("| across"))
     assert across.split("|")[2:5] == [f"{cell:>10} " for cell in ("3.61", "3", "2")]
-    assert "5 operations of stick_in_tower; 25.0 % were not seen" in text
+    assert "5 operations of stick_in_tower; 25.0 % were not observed" in text

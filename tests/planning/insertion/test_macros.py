@@ -139,34 +139,3 @@ def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict
     parts = {name: (solid, T) for name, _, solid, T in more}
     at = scenes.mm(0, 0, 40)
     return assembly(contacts, castle=(scenes.castle(), np.eye(4)), part=(scenes.stick(), at), **parts)
-
-
-def test_a_slot_under_a_roof_is_entered_from_its_end() -> None:
-    roof = scenes.cuboid("roof", (30, 30, 5))
-    found = arrival(slot(("roof", (), roof, scenes.mm(0, 0, 58))))
-    assert found.free
-    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
-        ("insert-into-slot", [1, 0, 0]),
-        ("move-to-contact", [0, 0, -1]),
-    ]
-    assert found.macros[0].length_m == pytest.approx(0.14)
-
-
-def hole(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
-    parts = {name: (solid, T) for name, _, solid, T in more}
-    contacts = {"cube": scenes.HOLE} | {name: pairs for name, pairs, _, _ in more if pairs}
-    return assembly(contacts, cube=(scenes.cube(), np.eye(4)), part=(scenes.stick(), np.eye(4)), **parts)
-
-
-def test_the_end_of_a_hole_that_is_free_is_taken() -> None:
-    """Along the axis of the stick, forwards; backwards if something stands there, or above where it would begin."""
-    forwards = arrival(hole()).line.direction
-    travel = arrival(hole()).line.travel_m
-    assert (forwards.tolist(), travel) == ([1, 0, 0], 0.155)
-    for x, z in ((-200, 0), (-250, 100)):
-        found = arrival(hole(("stop", (), scenes.block(), scenes.mm(x, 0, z))))
-        assert (found.line.direction.tolist(), found.free) == ([-1, 0, 0], True)
-    stops = [(f"stop{x}", (), scenes.block(), scenes.mm(x, 0, 0)) for x in (-200, 200)]
-    assert not arrival(hole(*stops)).free
-    assert arrival(hole(), Preference(-X)).line.direction.tolist() == [-1, 0, 0]
-    assert arrival(hole(), Preference(None, 0.2)).line.travel_m == 0.2

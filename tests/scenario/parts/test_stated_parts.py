@@ -71,10 +71,10 @@ FACES = {
         r"\1outline_mm = [[-20, -20, 0], [-20, -20, 11], [-20, 20, 11], [-20, 20, 0]]" + "\n",
         "no side of a piece lies below the face",
     ),
-    "a wider bore": (r"radius_mm = 3\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
+    "a wider bore": (r"radius_mm = 3.0\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
     "a bore that is a shaft": (r"(?s)(\[faces\.bore\].*?)hole = true", r"\1hole = false", "pieces have a side"),
     "half a turn of nothing": (r"hole = true", "hole = true\nextent_deg = 180", "extent_deg below 360 and toward"),
-    "a steeper cone": (r"radii_mm = \[4, 3\]", "radii_mm = [4, 3.2]", "of the wall"),
+    "a steeper cone": (r"radii_mm = \[4.0, 3.0\]", "radii_mm = [4, 3.2]", "of the wall"),
 }
 
 

@@ -1,4 +1,4 @@
-"""A comparison in words: tables for the terminal and the page, the page itself, and one JSON object."""
+"""Write a comparison: tables for the terminal and the page, the page itself, and one JSON object."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,24 +22,22 @@ _AGREEMENT = (
     "demonstration was not right in either are left out here."
 )
 _NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
-_CELLS = (
+_CONDITIONS = (
     "Rates over all trials of each side; alone and the difference, second minus first, over the trials that they share."
 )
 _MOST_LISTED = 2000
 """Changed trials that are listed."""
 _DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
 _WHERE = (
-    Column("scenario", "scenario", "place.scenario", words=True),
-    Column("conditions", "conditions", "place.conditions", words=True),
-    Column("method", "method", "place.method", words=True),
-    Column("noise_mm", "noise level", "place.noise_words", words=True),
+    Column("scenario", "scenario", "condition.scenario", words=True),
+    Column("conditions", "conditions", "condition.description", words=True),
+    Column("method", "method", "condition.method", words=True),
+    Column("noise_mm", "noise level", "condition.noise_words", words=True),
 )
 
 
 def comparison_tables(comparison: Comparison) -> dict[str, Table]:
-    """By the name of their file: verdicts that agree, by scenario and of all; how far numbers of the same trials are
-    apart; rates of both, cell by cell; trials whose verdicts differ, with sentences and commands; and what is not the
-    same in both."""
+    """By the name of their file: agreements, numbers, conditions, changed trials, differences of the runs."""
     agreement = (
         Column("scenario", "scenario", words=True),
         Column("trials", "trials"),
@@ -60,7 +58,7 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
         Column("largest difference", "largest difference", fill("{most:.3g}")),
         Column("in one alone", "in one alone", "alone"),
     )
-    cells = (
+    conditions = (
         *_WHERE,
         Column("first", "first", fill("{first.rate:percent}, n {first.trials}")),
         Column("second", "second", fill("{second.rate:percent}, n {second.trials}")),
@@ -88,7 +86,7 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     return {
         "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
         "numbers": Table(comparison.numbers, numbers, note=_NUMBERS),
-        "cells": Table(comparison.cells, cells, note=_CELLS),
+        "conditions": Table(comparison.conditions, conditions, note=_CONDITIONS),
         "changed": Table(comparison.changed[:_MOST_LISTED], changed, "No verdict differs."),
         "differences": Table(comparison.differences, differences, "Nothing that is said of them differs."),
     }
@@ -136,7 +134,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
         Section("verdicts", "Verdicts", [("table", tables["agreement"])]),
         Section("changed", "Trials whose verdicts differ", [changed, ("table", tables["changed"])]),
         Section("numbers", "Numbers", [("table", tables["numbers"])]),
-        Section("rates", "Rates", [("table", tables["cells"])]),
+        Section("rates", "Rates", [("table", tables["conditions"])]),
         Section("differences", "What is not the same", [("table", tables["differences"])]),
     ]
     html = page(" against ".join(names), in_words(comparison), folders, sections)
@@ -164,7 +162,7 @@ def comparison_form(comparison: Comparison) -> dict[str, Any]:
         "agreements": comparison.agreements,
         "numbers": comparison.numbers,
         "differences": comparison.differences,
-        "changed": [{name: x for name, x in line.items() if name != "place"} for line in comparison.changed],
+        "changed": [{name: x for name, x in line.items() if name != "condition"} for line in comparison.changed],
     }
 
 

@@ -1,14 +1,14 @@
 """Every figure of a sweep that has something to show, by the name of its file."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from apo_bench.benchmark.analysis import (
     ALL,
-    Cell,
+    Condition,
+    ConditionResult,
     Line,
     Paired,
-    Place,
     level_unit,
     levels_of,
     members,
@@ -21,49 +21,61 @@ from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.records import knows_truth, may_reobserve
 
 _FLOOR_MM = 1e-3
-"""Gaps below this are drawn here: what solvers leave of zero says nothing."""
+"""Smaller gaps are drawn here: they are residuals of solvers."""
 
 
 def figures(
-    cells: Sequence[Cell],
+    results: Sequence[ConditionResult],
     pairs: Sequence[Paired],
-    settings: Sequence[Place],
+    settings: Sequence[Condition],
     gaps: Sequence[Line],
     confusions: Sequence[Line],
-    recognitions: Sequence[Line],
+    detections: Sequence[Line],
     times: Sequence[Line],
 ) -> dict[str, Figure]:
-    """All but those without a panel."""
-    by_setting = members(settings, cells)
-    level = _unit(settings)
-    tightness = Axes("clearance per side over level [mm per mm]", "success", "percent")
-    max_reobservations = Axes("looks allowed after the first", "success", "percent")
-    gap = ("Gap of the contacts as seen and as planned", _gaps(settings, gaps), Axes(level, "gap [mm]", "log"))
+    """All figures with a panel."""
+    by_setting = members(settings, results)
+    level = "; ".join(dict.fromkeys(level_unit(setting.noise) for setting in settings))
+    tightness = Axes("clearance per side over noise level [mm per mm]", "success", "percent")
     lines = {
-        "success_over_level": ("Success over level", _over_level(by_setting), Axes(level, "success", "percent")),
-        "success_over_tightness": ("Success over tightness", _over_tightness(cells), tightness),
-        "success_over_looks": ("Success over the number of looks", _over_looks(cells), max_reobservations),
-        "gap_before_and_after": gap,
-        "detected": ("Recognised contacts", _recognised(recognitions), Axes("noise_level", "share", "percent")),
+        "success_over_noise_level": (
+            "Success over noise level",
+            _over_level(by_setting),
+            Axes(level, "success", "percent"),
+        ),
+        "success_over_tightness": ("Success over tightness", _over_tightness(results), tightness),
+        "success_over_reobservations": (
+            "Success over reobservations",
+            _over_reobservations(results),
+            Axes("reobservations allowed", "success", "percent"),
+        ),
+        "gap_before_and_after": (
+            "Gap of the contacts, observed and planned",
+            _gaps(settings, gaps),
+            Axes(level, "gap [mm]", "log"),
+        ),
+        "detected": ("Detected contacts", _detected(detections), Axes("noise level", "share", "percent")),
         "timing": ("Wall time of a trial", _times(times), Axes("method", "wall time [s]")),
     }
     for reference in dict.fromkeys(p.reference for p in pairs):
-        marks = _differences(settings, [p for p in pairs if p.reference == reference and p.pairs])
+        own = [p for p in pairs if p.reference == reference and p.pairs and p.condition.method != "uncorrected"]
+        marks = [
+            _mark(s, p.condition, p.difference or 0.0, *p.interval)
+            for s, inside in members(settings, own).items()
+            for p in inside
+        ]
         title = f"Difference of success to {reference}, same seeds"
         lines[f"difference_to_{reference}"] = (title, marks, Axes(level, "difference [points]", "points"))
     bars = {
-        "failure_stages": ("Where trials failed", _stages(by_setting)),
+        "failure_stages": ("Stages of failures", _stages(by_setting)),
         "prediction": ("Predicted against real failure", _predicted(confusions)),
     }
     drawn = {name: line_figure(title, marks, axes) for name, (title, marks, axes) in lines.items() if marks}
     return drawn | {name: bar_figure(title, panels) for name, (title, panels) in bars.items() if panels}
 
 
-def _over_level(by_setting: Mapping[Place, Sequence[Cell]]) -> list[Mark]:
-    """A panel per setting that has two levels or more; if there is none, of every setting.
-
-    The oracle meets no level, so it stands at each.
-    """
+def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[Mark]:
+    """A panel for each setting with two noise levels or more; without one, for each setting; the oracle at each."""
     levels = {s: levels_of(own) for s, own in by_setting.items()}
     least = min(2, max(map(len, levels.values()), default=1))
     return [
@@ -75,36 +87,30 @@ def _over_level(by_setting: Mapping[Place, Sequence[Cell]]) -> list[Mark]:
     ]
 
 
-def _title(setting: Place, cells: Sequence[Cell]) -> str:
-    """With how many trials its cells have."""
-    trials = [c.trials for c in cells]
+def _title(setting: Condition, results: Sequence[ConditionResult]) -> str:
+    """With the number of trials of its conditions."""
+    trials = [c.trials for c in results]
     return f"{setting.title}; n\u00a0{' to '.join(map(str, dict.fromkeys((min(trials), max(trials)))))}"
 
 
-def _differences(settings: Sequence[Place], pairs: Sequence[Paired]) -> list[Mark]:
-    """A panel per setting in which methods are compared with a reference."""
-    here = members(settings, [p for p in pairs if p.place.method != "uncorrected"])
-    return [_mark(s, p.place, p.difference or 0.0, *p.interval) for s, own in here.items() for p in own]
-
-
-def _gaps(settings: Sequence[Place], lines: Sequence[Line]) -> list[Mark]:
-    """Gaps as seen, which are the same for every method, and as planned."""
-    placed = {line["place"]: line for line in lines}
-    here = [(s, place) for s, places in members(settings, list(placed)).items() for place in places]
-    seen = [_mark(s, place._replace(method="as seen"), *_percentiles(placed[place], "seen")) for s, place in here]
-    once = {mark[:3]: mark for mark in seen}
-    return [*once.values(), *(_mark(s, place, *_percentiles(placed[place], "planned")) for s, place in here)]
+def _gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[Mark]:
+    """Observed gaps, which are the same for every method, and planned ones."""
+    of = {line["condition"]: line for line in lines}
+    here = [(s, condition) for s, inside in members(settings, list(of)).items() for condition in inside]
+    observed = [_mark(s, replace(c, method="observed"), *_percentiles(of[c], "observed")) for s, c in here]
+    once = {mark[:3]: mark for mark in observed}
+    return [*once.values(), *(_mark(s, c, *_percentiles(of[c], "planned")) for s, c in here)]
 
 
 def _percentiles(line: Line, of: str) -> list[float]:
     return [max(line[f"{of}_{name}"], _FLOOR_MM) for name in ("median_mm", "5", "95")]
 
 
-def _recognised(lines: Sequence[Line]) -> list[Mark]:
+def _detected(lines: Sequence[Line]) -> list[Mark]:
     """Over all scenarios where there are several."""
     return [
         Mark(
-            f"{what}; {line['noise']}, carelessness {line['human_error_scale']:g}",
+            f"{what}; {line['noise']}, human error {line['human_error_scale']:g}",
             line["contact_source"],
             (line["noise_mm"], line["noise_deg"]),
             noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
@@ -121,66 +127,61 @@ def _times(lines: Sequence[Line]) -> list[Mark]:
     return [Mark(line["scenario"], *[line["method"]] * 3, *(line[name] for name in names)) for line in lines]
 
 
-def _over_looks(cells: Sequence[Cell]) -> list[Mark]:
-    """What it is worth to look again, beside the methods that cannot ask for it, where several numbers were allowed."""
-    several = len({c.max_reobservations for c in cells if may_reobserve(c.method)}) > 1
+def _over_reobservations(results: Sequence[ConditionResult]) -> list[Mark]:
+    """All methods, if several numbers were allowed."""
+    several = len({c.max_reobservations for c in results if may_reobserve(c.method)}) > 1
     return [
         Mark(
-            c.setting._replace(max_reobservations=0).title,
+            replace(c.setting, max_reobservations=0).title,
             f"{c.method}, {c.noise_words}",
             c.max_reobservations,
             f"{c.max_reobservations}",
             c.rate,
             *c.interval,
         )
-        for c in cells
+        for c in results
         if several and c.rate is not None and not knows_truth(c.method)
     ]
 
 
-def _over_tightness(cells: Sequence[Cell]) -> list[Mark]:
-    """How much room a part has for what the camera errs: all clearances together, if a scenario has several."""
-    several = len({(c.scenario, c.clearance_mm) for c in cells}) > len({c.scenario for c in cells})
+def _over_tightness(results: Sequence[ConditionResult]) -> list[Mark]:
+    """All clearances together, if a scenario has several."""
+    several = len({(c.scenario, c.clearance_mm) for c in results}) > len({c.scenario for c in results})
     return [
-        Mark(c.setting._replace(clearance_mm=0.0).title, c.method, c.tightness, f"{c.tightness:g}", c.rate, *c.interval)
-        for c in cells
+        Mark(replace(c.setting, clearance_mm=0.0).title, c.method, c.tightness, f"{c.tightness:g}", c.rate, *c.interval)
+        for c in results
         if several and c.tightness and c.rate is not None and not knows_truth(c.method)
     ]
 
 
-def _stages(by_setting: Mapping[Place, Sequence[Cell]]) -> dict[str, Shares]:
-    """For every cell of a setting a bar of shares: success, then the stages that failed."""
+def _stages(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> dict[str, Shares]:
+    """A bar for every condition: success, then the stages that failed."""
     bars = {
         s.title: {f"{c.method}, {c.noise_words}": _endings(c) for c in own if c.trials} for s, own in by_setting.items()
     }
     return {title: own for title, own in bars.items() if own}
 
 
-def _endings(cell: Cell) -> dict[str, int]:
-    counts = {"success": cell.successes} if cell.successes else {}
-    for why, count in cell.failures.items():
+def _endings(result: ConditionResult) -> dict[str, int]:
+    counts = {"success": result.successes} if result.successes else {}
+    for why, count in result.failures.items():
         stage = why.partition(":")[0]
         counts[stage] = counts.get(stage, 0) + count
     return counts
 
 
 def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
-    """For every method a bar of what was predicted and came of it."""
+    """A bar for every method: the prediction and the result."""
     kinds = ("fit_fitted", "fit_failed", "fail_fitted", "fail_failed")
     bars = {
         f"{line['scenario']}, {line['method']}": {kind.replace("_", ": "): line[f"predicted_{kind}"] for kind in kinds}
         for line in lines
         if line["executed"]
     }
-    return {"predicted: what happened": bars} if bars else {}
+    return {"predicted: result": bars} if bars else {}
 
 
-def _mark(setting: Place, place: Place, value: float, low: float, high: float) -> Mark:
-    """Of something at a level."""
-    level = (place.noise_mm, place.noise_deg)
-    return Mark(setting.title, place.method, level, noise_words(level, setting.noise), value, low, high)
-
-
-def _unit(settings: Iterable[Any]) -> str:
-    """What a level is; where settings differ in that, each of them."""
-    return "; ".join(dict.fromkeys(level_unit(setting.noise) for setting in settings))
+def _mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> Mark:
+    """A value at a noise level."""
+    level = (condition.noise_mm, condition.noise_deg)
+    return Mark(setting.title, condition.method, level, noise_words(level, setting.noise), value, low, high)

@@ -46,17 +46,17 @@ def line_figure(title: str, marks: Sequence[Mark], axes: Axes) -> Figure:
 
 
 def _panel(title: str, marks: Sequence[Mark], axes: Axes, looks: dict[str, Style]) -> Panel:
-    places = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
-    labels = {places[mark.at]: mark.label for mark in marks}
+    conditions = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
+    labels = {conditions[mark.at]: mark.label for mark in marks}
     lines = grouped((mark.line, mark) for mark in marks)
     step = min(_APART, _WITHIN / len(lines))
 
     def draw_lines(axis: Any) -> None:
         for i, (name, own) in enumerate(lines.items()):
-            x = np.array([places[mark.at] for mark in own]) + step * (i - (len(lines) - 1) / 2)
+            x = np.array([conditions[mark.at] for mark in own]) + step * (i - (len(lines) - 1) / 2)
             _line(axis, x, own, looks[name])
         axis.set_xticks(list(labels), list(labels.values()))
-        axis.set_xlim(-0.5, len(places) - 0.5)
+        axis.set_xlim(-0.5, len(conditions) - 0.5)
         axis.set(xlabel=axes.x, ylabel=axes.y)
         _scale(axis, axes.kind)
 

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Cell, members, place_of, settings
+from apo_bench.benchmark.analysis import ConditionResult, condition_of, members, settings
 from apo_bench.benchmark.report.facts import run_facts
 from apo_bench.benchmark.report.figures.sheet import Figure
-from apo_bench.benchmark.report.page.cells import matrix, pack_trials
+from apo_bench.benchmark.report.page.matrix import matrix, pack_trials
 from apo_bench.benchmark.report.page.page import Section, as_data, page
 from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.benchmark.report.tables.table import Table
@@ -18,19 +18,18 @@ from apo_bench.records.run.run_file import limits_of, scenario_files
 from apo_bench.records.run.trials import Trials
 
 _SUCCESS = (
-    "A level of L is a standard deviation of L mm and L degrees per axis, times what the noise model makes of it in a "
-    "direction or for a part; of the range finder it is one of L mm per ray. Success, that the finished assembly is "
-    "right, with Wilson's 95 % interval and the number of trials; below it, where it is not the same, how many were "
-    "also made as demonstrated: each contact when and where it was shown. A cell opens its trials, each with the "
-    "command that runs it again. `oracle` replays the drawn layout, without noise or carelessness; `none` replays what "
-    "was seen; neither is told what touches what. A method that refuses or does not converge counts as failed; success "
-    "among the trials that were carried out stands below where it differs. Demonstrations that were not right "
-    "themselves are left out of every method."
+    "A noise level of L is a standard deviation of L mm and L degrees per axis, which the noise model scales for a "
+    "direction or a part; of the depth camera it is L mm per ray. Success means that the finished assembly is right, "
+    "with Wilson's 95 % interval and the number of trials. Below it, where it differs, stand the trials that were also "
+    "made as demonstrated: each contact when and where it was shown. A cell opens its trials, each with the command "
+    "that runs it again. `oracle` replays the true poses, without noise or human error; `uncorrected` replays the "
+    "observed poses. A method that abstains or does not converge counts as failed; success among the executed trials "
+    "stands below where it differs. No method counts demonstrations that were not right themselves."
 )
 _RUN = (
-    "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions "
-    "(trials that a limit ended: with the limits that `run.json` says, those of the last start of the sweep). Where "
-    "trials were drawn with a salt, `FILE` in a command stands for its file, without which nobody can draw them again."
+    "Run the commands of this page where the sweep ran; they give the same records with the same versions. For trials "
+    "that a limit ended they use the limits of `run.json`. For trials drawn with a secret seed, `FILE` stands for its "
+    "file."
 )
 _BANDS = "Bands are 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
 
@@ -43,7 +42,7 @@ class Contents(NamedTuple):
     answer: str
     """The sentences at the top, with `code` marked."""
     trials: Trials
-    cells: Sequence[Cell]
+    results: Sequence[ConditionResult]
     figures: Mapping[str, Figure]
     tables: Mapping[str, Table]
     run: Mapping[str, Any]
@@ -57,27 +56,27 @@ class Contents(NamedTuple):
 
 def report_page(c: Contents) -> str:
     """The page, as HTML."""
-    numbers = {cell.place: i for i, cell in enumerate(c.cells)}
-    shown = [(place_of(picture.row), picture.row["seed"]) for picture in c.pictures]
-    pictured = {f"{numbers[place]}:{seed}": k for k, (place, seed) in enumerate(shown) if place in numbers}
-    by_setting = members(settings(c.cells), c.cells)
+    numbers = {result.condition: i for i, result in enumerate(c.results)}
+    shown = [(condition_of(picture.row), picture.row["seed"]) for picture in c.pictures]
+    pictured = {f"{numbers[condition]}:{seed}": k for k, (condition, seed) in enumerate(shown) if condition in numbers}
+    by_setting = members(settings(c.results), c.results)
     matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
-    over = ("success_over_level", "success_over_tightness", "success_over_looks")
+    over = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations")
     sections = [
         Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)]),
-        Section("levels", "Success over level", [("text", _BANDS), *_shown(c, over, "half_levels")]),
+        Section("levels", "Success over noise level", [("text", _BANDS), *_shown(c, over, "half_levels")]),
         Section("pairs", "Paired differences", _shown(c, differences, "pairs")),
-        Section("stages", "Where trials failed", _shown(c, ("failure_stages",))),
-        Section("pictures", "Some failures", _pictures(c)),
+        Section("stages", "Stages of failures", _shown(c, ("failure_stages",))),
+        Section("pictures", "Failures", _pictures(c)),
         Section("gaps", "Gap before and after correction", _shown(c, ("gap_before_and_after",), "gaps")),
         Section("prediction", "Prediction and physics", _shown(c, ("prediction",), "confusion")),
-        Section("felt", "What robots felt about themselves", _shown(c, (), "felt")),
-        Section("effort", "What it takes", _shown(c, (), "effort")),
+        Section("probing", "Probing", _shown(c, (), "probing")),
+        Section("effort", "Effort", _shown(c, (), "effort")),
         Section("calibration", "Calibration", _shown(c, (), "calibration")),
-        Section("detected", "Recognised contacts", _shown(c, ("detected",), "detected")),
+        Section("detected", "Detected contacts", _shown(c, ("detected",), "detected")),
         Section("timing", "Timing", _shown(c, ("timing",), "times", "work")),
-        Section("run", "What was run", _run(c)),
+        Section("run", "Run", _run(c)),
     ]
     title = c.name if "sweep" in c.name.lower() else f"Sweep {c.name}"
     packed = pack_trials(c.trials, scenario_files(c.run), limits_of(c.run), pictured)
@@ -100,8 +99,8 @@ def _pictures(c: Contents) -> list[tuple[str, Any]]:
 
 def _picture(c: Contents, number: int) -> dict[str, str]:
     row, jpeg, words = c.pictures[number]
-    place = place_of(row)
-    where = "" if place is None else f"{place.title}, level {place.noise_mm:g}, "
+    condition = condition_of(row)
+    where = "" if condition is None else f"{condition.title}, noise {condition.noise_mm:g}, "
     return {
         "name": f"picture-{number}",
         "title": f"{row['method']}: {why(row)}.",

@@ -1,59 +1,59 @@
-"""Tables of lines that are counted over many conditions, as the statistics make them: column -> value."""
+"""Tables of lines that are counted over many conditions."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from apo_bench.benchmark.analysis import Line, percent
-from apo_bench.benchmark.report.tables.table import Column, Table, interval_columns, place_columns
+from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, interval_columns
 
 _METHOD = (Column("scenario", "scenario", words=True), Column("method", "method", words=True))
 
 
 def gap_table(lines: Sequence[Line]) -> Table:
-    """One line per cell."""
+    """One line per condition."""
     return Table(
         lines,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("trials", "n"),
-            Column("seen_5"),
-            Column("seen_median_mm", "as seen [mm]", text="{seen_median_mm:.3f}"),
-            Column("seen_95"),
+            Column("observed_5"),
+            Column("observed_median_mm", "observed [mm]", text="{observed_median_mm:.3f}"),
+            Column("observed_95"),
             Column("planned_5"),
-            Column("planned_median_mm", "as planned [mm]", text="{planned_median_mm:.3f}"),
+            Column("planned_median_mm", "planned [mm]", text="{planned_median_mm:.3f}"),
             Column("planned_95", "95 % are below [mm]", text="{planned_95:.3f}"),
         ),
         "No method that corrects had a plan, so there is no gap to compare.",
         (
-            "The largest distance of any face from the one it should touch, as it was seen and as the method planned "
-            "it: medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below "
-            "0.001 mm is drawn there. `none` plans what was seen."
+            "The largest distance of any face from the one it should touch, at the observed and at the planned poses: "
+            "medians, and in the drawing bands from the 5th to the 95th percentile of the trials. Gaps below 0.001 mm "
+            "are drawn there. `uncorrected` plans the observed poses."
         ),
     )
 
 
-def felt_table(lines: Sequence[Line]) -> Table:
-    """One line per cell of a robot that feels."""
-    heads = {"drawn": "drawn with", "stated": "stated", "estimated": "estimated", "sure": "sure to"}
+def probing_table(lines: Sequence[Line]) -> Table:
+    """One line per condition of a robot that probes."""
+    heads = {"drawn": "drawn with", "assumed": "assumed", "estimated": "estimated", "std": "stated std"}
     return Table(
         lines,
         (
-            *place_columns(),
+            *condition_columns(),
             Column("trials", "n"),
-            Column("probe_contacts", "probe_contacts", text="{probe_contacts:.1f}"),
-            Column("refused", "refused"),
+            Column("probe_contacts", "probe contacts", text="{probe_contacts:.1f}"),
+            Column("rejected", "rejected"),
             *(
                 Column(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
                 for unit in ("mm", "deg")
                 for name, head in heads.items()
             ),
         ),
-        "No robot felt.",
+        "No robot probed.",
         (
-            "How far the base of a robot that feels (`+probe`) is off at the middle of the goals: by what its error was "
-            "drawn with, by what it was told, as it felt in the end, and how far that may be wrong, as it says itself. "
-            "All are root mean squares of vectors: the square root of three times a standard deviation per axis. "
-            "*Refused* are touches that contradicted the others, of all trials together."
+            "How far the base of a robot that probes (`+probe`) is off at the middle of the poses: by the standard "
+            "deviation of its error, by the one it assumes, by its final estimate, and the standard deviation that it "
+            "states of that. All are root mean squares of vectors: the square root of three times a standard "
+            "deviation per axis. *Rejected* are probe contacts that contradicted the others, of all trials together."
         ),
     )
 
@@ -71,8 +71,8 @@ def effort_table(lines: Sequence[Line]) -> Table:
         ),
         "No trial was right.",
         (
-            "Of trials that were right: the operations that were undone and done again, the simulated time, and how "
-            "far a part that was in place was pushed at most."
+            "Of successful trials: the operations that were undone and done again, the simulated time, and how far a "
+            "finished part was pushed at most."
         ),
     )
 
@@ -109,7 +109,7 @@ def work_table(lines: Sequence[Line]) -> Table:
 
 
 def calibration_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario, noise, relations and method."""
+    """One line per scenario, noise, contact source and method."""
     share = "{{{0}.rate:percent}} of {{{0}.trials}}".format
     return Table(
         lines,
@@ -128,12 +128,12 @@ def calibration_table(lines: Sequence[Line]) -> Table:
         ),
         "No trial of a method but the oracle counts.",
         (
-            "Over every level, carelessness and clearance. *Covered* is how often the truth lies in the 95 % region "
-            "that a correction states. Errors are root mean squares of the planned goals, in directions that the "
-            "contacts fix, also over the clearance, and in those that they leave free. A test *fails* where the "
-            "stated noise does not explain the correction: a false alarm where the relations are as given, a catch "
-            "where they are wrong. The *culprit* is how often the wrong relation, if it is one of those that were "
-            "told, is in the ambiguity set of a failed test."
+            "Over every noise level, human error scale and clearance. *Covered* is how often the truth lies in the "
+            "95 % region that a correction states. Errors are root mean squares of the planned poses, in directions "
+            "that the contacts fix, also over the clearance, and in those that they leave free. A test *fails* where "
+            "the stated noise does not explain the correction: a false alarm with given contacts, a hit with wrong "
+            "ones. The *culprit* is how often the wrong contact, if it is one of those that were given, is in the "
+            "ambiguity set of a failed test."
         ),
     )
 
@@ -156,15 +156,15 @@ def confusion_table(lines: Sequence[Line]) -> Table:
             Column("excluded", "excluded"),
         ),
         note=(
-            "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides: *fitted* is "
-            "made as demonstrated. An operation is right where the robot stopped at the one that was predicted. A "
-            "method that gave no plan has nothing executed."
+            "Before it is executed, a plan is predicted to *fit* or *fail*; then physics decides: *fitted* means made "
+            "as demonstrated. The operation is right if the robot stopped at the predicted one. A method without a "
+            "plan has nothing executed."
         ),
     )
 
 
-def recognition_table(lines: Sequence[Line]) -> Table:
-    """One line per scenario, noise, eye, way of recognising, carelessness and level."""
+def detection_table(lines: Sequence[Line]) -> Table:
+    """One line per scenario, noise, pose source, contact source, human error scale and noise level."""
     return Table(
         lines,
         (
@@ -186,11 +186,10 @@ def recognition_table(lines: Sequence[Line]) -> Table:
             Column("precision", "precision", text="{precision:percent2}"),
             Column("recall", "recall", text="{recall:percent2}"),
         ),
-        "No method was told relations that were recognised.",
+        "No method used detected contacts.",
         (
-            "Contacts that were recognised, against those of the scenario: how many demonstrations had all right and "
-            "none too many; how many of the recognised contacts are right (precision), and of the right ones were "
-            "recognised (recall)."
+            "Detected contacts against those of the scenario: in how many demonstrations all were right and none too "
+            "many; how many detected contacts are right (precision), and how many right ones were detected (recall)."
         ),
     )
 

@@ -160,11 +160,11 @@ def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]
     return [path, beside]
 
 
-def place_columns(path: str = "place", levels: bool = True) -> tuple[Column, ...]:
+def condition_columns(path: str = "condition", levels: bool = True) -> tuple[Column, ...]:
     """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
 
     Args:
-        path: From an item to its place.
+        path: From an item to its condition.
     """
     last = (
         "grasp",
@@ -177,7 +177,7 @@ def place_columns(path: str = "place", levels: bool = True) -> tuple[Column, ...
     )
     return (
         Column("scenario", "scenario", f"{path}.scenario", words=True, group=True),
-        Column("", "conditions", f"{path}.conditions", words=True, group=True),
+        Column("", "conditions", f"{path}.description", words=True, group=True),
         *(
             Column(name, value=f"{path}.{name}")
             for name in ("clearance_mm", "noise", "contact_source", "human_error_scale")

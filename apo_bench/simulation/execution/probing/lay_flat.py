@@ -30,28 +30,22 @@ PRESS_N = 3.0
 """How hard it is pressed on the floor."""
 NEAR_M = 0.004
 """From so far above where the floor is expected it goes down by force."""
-LAY_SPEED = 0.2
-_UP = 0.2
-_OFF = 0.02
-_OFF_M = 0.002
-"""Peak speeds, [m/s]; off the floor it goes slowly at first."""
-YIELD_M = 0.0005
-_TURN_RAD = 0.015
-"""How fast it gives way, [m/s] to a newton, and how fast it turns, [rad/s], while it lies on one foot only."""
-FASTEST = 0.005
-FASTEST_RAD = 0.05
-"""[m/s], [rad/s]."""
-CALM = 0.15
-CALM_RAD = 6e-4
-"""It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]; both
-are averaged over `averaged_s`."""
-CALM_S = 0.1
-_SURELY = 3.0
-"""What is averaged has so many times less noise than the limit."""
+LAY_SPEED = 0.2  # peak speed [m/s] down to the floor
+_UP = 0.2  # peak speed [m/s] up again
+_OFF = 0.02  # peak speed [m/s] just off the floor
+_OFF_M = 0.002  # so far it goes slowly off the floor
+YIELD_M = 0.0005  # [m/s/N]: how fast the part gives way to force
+_TURN_RAD = 0.015  # [rad/s]: how fast it turns while it lies on one foot only
+FASTEST = 0.005  # [m/s] at most
+FASTEST_RAD = 0.05  # [rad/s] at most
+CALM = 0.15  # it lies when the press is met within this part of it
+CALM_RAD = 6e-4  # and it turns slower than this, [rad/s], averaged over `averaged_s`
+CALM_S = 0.1  # for so long
+_SURELY = 3.0  # averaged forces have so many times less noise than the limit
 LONGEST_S = 3.0
 """A sensor that would have to be averaged longer is too noisy: nothing is laid then."""
-MOST_S = 15.0
-DEEPEST_M = 0.012
+MOST_S = 15.0  # laying ends after this time
+DEEPEST_M = 0.012  # or so far below its begin
 
 
 def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, grip: Grip) -> Grip:

@@ -23,18 +23,17 @@ OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
 ROOM_M = 0.003
 """Everything else stays so far away."""
-_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
-_ANGLES = 24
+_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)  # of the rings around the goals on which the floor is touched
+_ANGLES = 24  # places of a ring
 _PATCH_M = 0.025
 """The hand touches a floor that is whole so far around."""
 _SLACK = 3
 """Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
-_END_M = 1e-4
+_END_M = 1e-4  # shapes that end within this of the farthest end touch
 _OVER_M = 0.003
 """A wall is touched so high over its foot, with the lowest part of the fingers."""
-_LIFT_M = 0.12
-_LOOKS_M = 0.004
-"""The hand comes straight down from so far above; it is looked at so often."""
+_LIFT_M = 0.12  # the hand comes straight down from so far above
+_LOOKS_M = 0.004  # its room is checked so often
 
 
 StandOff = Callable[[Array, Array], float]
@@ -190,7 +189,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
-    return gripper_boxes(scene.kinematics, scene.arm, OPENING_M)
+    return gripper_boxes(scene.kinematics, OPENING_M)
 
 
 def _lowest(boxes: Sequence[Box]) -> Array:
@@ -205,7 +204,7 @@ def _lowest(boxes: Sequence[Box]) -> Array:
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
     """Whether the hand can come straight down to a pose that the arm reaches."""
     lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
-    if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
+    if gripper_depth(scene.kinematics, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
     above = scene.kinematics.inverse(translate(T, UP, _LIFT_M), np.array(scene.arm.home))
     return above is not None and scene.kinematics.inverse(T, above) is not None

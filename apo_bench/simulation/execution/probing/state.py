@@ -26,14 +26,11 @@ FOOT_SIGMA_M = 1e-4
 SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """Standard deviations of a part between pads that closed twice, [m, rad], a twist of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
-_CORNERS = 3
-_FLAT_M = 1e-5
-"""The corner of the hand that touched is determined so often, as the estimate changes; a patch that lies within the
-second touched with its middle."""
-_OFF_SIGMAS = 3.0
-_TOUCH_N = 2.0
-_SIGMAS = 6.0
-"""A touch ends by this force, or by so many standard deviations of the sensor at the wrist."""
+_CORNERS = 3  # how often the touching corner of the hand is determined, as the estimate changes
+_FLAT_M = 1e-5  # a patch that lies within this touched with its middle
+_OFF_SIGMAS = 3.0  # how far the tip may be off, in standard deviations
+_TOUCH_N = 2.0  # [N]: a touch ends by this force
+_SIGMAS = 6.0  # or by so many standard deviations of the sensor at the wrist
 
 
 def touch_guard(sigma_n: float) -> float:

@@ -34,10 +34,9 @@ SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
 BEYOND_M = 0.001
 """The floor or a wall may be so much farther than expected."""
-_DOWN = 0.4
-_OVER = 0.8
-_BACK = 0.3
-"""Peak speeds of the empty hand, [m/s]."""
+_DOWN = 0.4  # peak speed [m/s] of the empty hand down to a place
+_OVER = 0.8  # as `_DOWN`, over the parts
+_BACK = 0.3  # as `_DOWN`, back from a touch
 _HALF_TURN = 3.0
 """A hand that turns by more passes by its rest, [rad]: the shorter way may lead over where the wrist ends."""
 _HIGH_M = 0.1

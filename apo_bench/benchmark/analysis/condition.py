@@ -1,0 +1,161 @@
+"""Conditions: what trials share that differ in nothing but the seed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.records import (
+    DEPTH_CAMERA,
+    NO_ROBOT_ERROR,
+    USUAL,
+    TrialConfig,
+    affects,
+    knows_truth,
+    parse_method,
+)
+from apo_bench.records.run.trials import Trials
+
+_FIRST = ("oracle", "uncorrected", "spiral-search", "nominal", "contact", "paper", "paper-track")
+"""Methods in the order of tables: the ceiling, plans without a correction, `contact`, the paper's two methods."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """All settings of a trial that a sweep may vary, except the seed.
+
+    A curve over noise levels has the noise 0, and a setting, which a table or panel shows, also the method ``.
+    """
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    contact_source: str
+    human_error_scale: float
+    noise_mm: float
+    noise_deg: float
+    method: str
+    grasp: str = TrialConfig.grasp
+    fidelity: str = TrialConfig.fidelity
+    max_reobservations: int = TrialConfig.max_reobservations
+    robot_error: str = TrialConfig.robot_error
+    ft_sensor: str = TrialConfig.ft_sensor
+    assumed_robot_error: str = TrialConfig.assumed_robot_error
+    min_predicted_success: float = TrialConfig.min_predicted_success
+
+    @property
+    def condition(self) -> "Condition":
+        """The condition alone, of something that has one."""
+        return Condition(*(getattr(self, name) for name in CONDITION_FIELDS))
+
+    @property
+    def curve(self) -> "Condition":
+        """The same at every noise level."""
+        return replace(self.condition, noise_mm=0.0, noise_deg=0.0)
+
+    @property
+    def setting(self) -> "Condition":
+        """The same at every noise level, of every method."""
+        return replace(self.curve, method="")
+
+    @property
+    def noise_words(self) -> str:
+        """`0.5`, or `0.5 mm, 1 deg`; `any` of the oracle, which noise does not affect."""
+        return "any" if knows_truth(self.method) else noise_label(self.noise_mm, self.noise_deg, self.noise)
+
+    @property
+    def words(self) -> Mapping[str, Any]:
+        """The value of each setting, `any` where it does not affect the method."""
+        return {name: getattr(self, name) if affects(name, self.method) else "any" for name in CONDITION_FIELDS}
+
+    @property
+    def title(self) -> str:
+        """`stick_in_tower, human error 1, 0.25 mm clearance`, and whatever is not a default."""
+        return f"{self.scenario}, {self.description}"
+
+    @property
+    def description(self) -> str:
+        """All but scenario, method and noise level in words, without most defaults."""
+        words = {
+            f"human error {self.human_error_scale:g}": True,
+            f"{self.clearance_mm:g} mm clearance": True,
+            "depth camera" if self.noise == DEPTH_CAMERA else f"{self.noise} noise": self.noise != USUAL,
+            f"contacts {self.contact_source}": self.contact_source != "given",
+            f"{self.grasp} grasp": self.grasp != TrialConfig.grasp,
+            f"robot error {self.robot_error}": self.robot_error != NO_ROBOT_ERROR,
+            f"fidelity {self.fidelity}": self.fidelity != "full",
+            f"{self.max_reobservations} reobservations": self.max_reobservations > 0,
+            f"sensor {self.ft_sensor}": self.ft_sensor != TrialConfig.ft_sensor,
+            f"assumed error {self.assumed_robot_error}": self.assumed_robot_error != TrialConfig.assumed_robot_error,
+            f"abstaining below {self.min_predicted_success:g}": self.min_predicted_success > 0,
+        }
+        return ", ".join(text for text, is_shown in words.items() if is_shown)
+
+
+CONDITION_FIELDS = tuple(field.name for field in fields(Condition))
+"""Columns of a trial record, too."""
+_OTHERS = tuple(field.name for field in fields(Condition)[8:])
+
+
+def noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> str:
+    """`0.5`, `0.5 mm, 1 deg` where the two differ, or `0.5 mm per ray` of the depth camera."""
+    if noise == DEPTH_CAMERA:
+        return f"{noise_mm:g} mm per ray"
+    return f"{noise_mm:g}" if noise_mm == noise_deg else f"{noise_mm:g} mm, {noise_deg:g} deg"
+
+
+def rank(method: str) -> int:
+    """The position of a method in a table; one with `+spiral` or `+probe` ranks like the method."""
+    plain = method if method in _FIRST else parse_method(method).corrector
+    return _FIRST.index(plain) if plain in _FIRST else len(_FIRST)
+
+
+def rank_contact_source(contact_source: str) -> tuple[int, str]:
+    """The given contacts first."""
+    return int(contact_source != "given"), contact_source
+
+
+def order(c: Condition) -> tuple[Any, ...]:
+    """How conditions are sorted: by setting, with defaults first, then by method (`oracle` first), then by noise."""
+    others = ((getattr(c, name) != getattr(TrialConfig, name), getattr(c, name)) for name in _OTHERS)
+    noise = (c.noise != USUAL, c.noise, rank_contact_source(c.contact_source))
+    return (
+        *(c.scenario, c.clearance_mm, noise, c.human_error_scale, *others),
+        *(rank(c.method), c.method, c.noise_mm, c.noise_deg),
+    )
+
+
+def condition_of(record: Mapping[str, Any]) -> Condition | None:
+    """The condition of a record; None for an observation from a file, which has no noise level."""
+    if record["noise_mm"] is None:
+        return None
+    return Condition(**{name: record[name] for name in CONDITION_FIELDS if name in record})
+
+
+def by_condition(trials: Trials) -> dict[Condition, Trials]:
+    """The trials of every condition, in the order of their seeds, without observations from files.
+
+    Raises:
+        InputError: A trial is there twice, which would make intervals narrower than they are; or the trials were drawn
+            with several secret seeds, so that equal seeds are different trials.
+    """
+    trials.find_secret_seed()
+    drawn = trials.where(~np.isnan(trials.number("noise_mm")))
+    found = {Condition(*key): own for key, own in drawn.parts(CONDITION_FIELDS).items()}
+    for condition, own in found.items():
+        seeds = own.number("seed")
+        twice = seeds[1:][np.diff(seeds) == 0]
+        if len(twice):
+            raise InputError(
+                f"the records hold a trial twice ({condition.scenario}, {condition.method}, noise "
+                f"{condition.noise_mm:g}, seed {twice[0]:.0f}); every trial counts once, so leave one of the two out."
+            )
+    return {condition: found[condition] for condition in sorted(found, key=order)}
+
+
+def by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
+    """Scenario and method -> trials, sorted as conditions are."""
+    groups = trials.parts(("scenario", "method"))
+    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}

@@ -1,0 +1,50 @@
+"""Detected contacts against those of the scenario."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.rates import Rate, Records
+from apo_bench.records import DETECTED
+from apo_bench.records.run.trials import Trials, trials_of
+
+_AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_mm", "noise_deg")
+
+
+def detections(records: Records) -> list[Line]:
+    """One line per scenario, noise, pose and contact source, human error scale and noise level; and over all scenarios.
+
+    Methods of one seed get the same contacts, so each observation counts once. A demonstration is complete if exactly
+    its contacts were detected.
+    """
+    trials = trials_of(records)
+    known = ~np.isnan(trials.number("contacts_true_positive")) & ~np.isnan(trials.number("noise_mm"))
+    detected = trials.where(known & trials.holds("contact_source", DETECTED.__contains__))
+    observations = detected.groups((*_AXES, "seed", "clearance_mm")).of
+    once = detected.where(np.unique(observations, return_index=True)[1])
+    parts = once.parts(_AXES)
+    if len(once.distinct("scenario")) > 1:
+        parts |= {(ALL, *key): own for key, own in once.parts(_AXES[1:]).items()}
+    return [_line(dict(zip(_AXES, key, strict=True)), parts[key]) for key in sorted(parts, key=_order)]
+
+
+def _line(axes: Line, trials: Trials) -> Line:
+    missed = trials.number("contacts_false_negative")
+    false = trials.number("contacts_false_positive")
+    right = int(trials.number("contacts_true_positive").sum())
+    return axes | {
+        "right": right,
+        "missed": int(missed.sum()),
+        "false": int(false.sum()),
+        "demonstrations": len(trials),
+        "complete": Rate(int(((missed == 0) & (false == 0)).sum()), len(trials)),
+        "precision": Rate(right, right + int(false.sum())).rate,
+        "recall": Rate(right, right + int(missed.sum())).rate,
+    }
+
+
+def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+    """All scenarios last; contact sources in their own order."""
+    scenario, noise, pose_source, contact_source, *rest = key
+    return (scenario == ALL, scenario, noise, pose_source, DETECTED.index(contact_source), *rest)

@@ -1,0 +1,111 @@
+"""The cells of a page: a matrix of methods over levels for every setting, and the trials of every cell for the script.
+
+A cell is a button that opens its trials.
+"""
+
+import base64
+import gzip
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.benchmark.analysis import (
+    Condition,
+    ConditionResult,
+    by_condition,
+    level_of,
+    level_unit,
+    levels_of,
+    noise_words,
+)
+from apo_bench.benchmark.report.trials import NUMBERS, predicted, verdict, why
+from apo_bench.io import grouped
+from apo_bench.records import Limits, knows_truth
+from apo_bench.records.run.replay_command import Files, without_seed
+from apo_bench.records.run.trials import Trials
+
+_DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
+"""Of numbers; of those in mm and degrees, and of others, three."""
+
+
+class Button(NamedTuple):
+    """A cell that opens its trials."""
+
+    number: int
+    """Among all cells."""
+    cell: ConditionResult
+    span: int
+    """Levels that it holds for: the oracle meets none, so it stands for all."""
+
+
+class Matrix(NamedTuple):
+    """Of one setting."""
+
+    title: str
+    corner: str
+    head: Sequence[str]
+    """The levels."""
+    lines: Sequence[tuple[str, Sequence[Button | None]]]
+    """Method, and its cells; None where a level was not run."""
+
+
+def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mapping[Condition, int]) -> Matrix:
+    """The cells of a setting.
+
+    Args:
+        numbers: Condition -> its number among all cells.
+    """
+    levels = levels_of(cells)
+    lines: list[tuple[str, list[Button | None]]] = []
+    for method, own in grouped((c.method, c) for c in cells).items():
+        by_level = {level_of(c): Button(numbers[c.condition], c, 1) for c in own}
+        across = [by_level.get(level) for level in levels]
+        if knows_truth(method):
+            across = [Button(numbers[c.condition], c, max(1, len(levels))) for c in own]
+        lines.append((method, across))
+    corner = f"method, {level_unit(setting.noise)}" if levels else "method"
+    return Matrix(setting.title, corner, [noise_words(x, setting.noise) for x in levels] or ["any"], lines)
+
+
+def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[str, int]) -> str:
+    """What the script needs to show the trials of any cell: base64 of gzip of JSON.
+
+    Args:
+        pictures: `cell:seed` -> number of the picture of that trial.
+    """
+    cells = by_condition(trials).values()
+    words: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "verdict": verdict,
+        "why": why,
+        "sentence": lambda row: row["sentence"] or "",
+        "failure_prediction": predicted,
+        "command": lambda row: without_seed(row, files, limits),
+    }
+    columns: dict[str, list[Any]] = {name: [] for name in ("seed", *words, *NUMBERS)}
+    known: dict[str, dict[str, int]] = {name: {} for name in words}  # texts are often the same: kept once, by number
+    for own in cells:
+        columns["seed"] += own.values("seed")
+        for name in NUMBERS:
+            columns[name] += [_rounded(x, _DECIMALS.get(name, 3)) for x in own.values(name)]
+        for row in own.rows():
+            for name, say in words.items():
+                columns[name].append(known[name].setdefault(say(row), len(known[name])))
+    values = {
+        "ends": np.cumsum([len(own) for own in cells]).tolist(),
+        "words": {name: list(texts) for name, texts in known.items()},
+        "numbers": [[name, label, _DECIMALS.get(name, 3)] for name, label in NUMBERS.items()],
+        "columns": columns,
+        "pictures": pictures,
+    }
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), compresslevel=6, mtime=0)).decode()
+
+
+def _rounded(x: Any, decimals: int) -> float | int | None:
+    """A number as it is shown; the script writes the zeros at the end."""
+    if x is None or isinstance(x, int):
+        return x
+    near = round(float(x), decimals)
+    return int(near) if near == int(near) else near

@@ -1,0 +1,154 @@
+"""Tables of success: rates of cells, pairs of methods over the same seeds, levels of half success."""
+
+from collections.abc import Sequence
+
+from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, Paired
+from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, endings, interval_columns
+from apo_bench.records import TrialConfig
+
+_AXES = (
+    "noise",
+    "contact_source",
+    "max_reobservations",
+    "robot_error",
+    "ft_sensor",
+    "assumed_robot_error",
+    "min_predicted_success",
+)
+"""Shown to people where they are not as usual in some cell."""
+
+
+def condition_table(cells: Sequence[ConditionResult]) -> Table:
+    """Axes that are as usual in every cell are left to files."""
+    unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
+    min_predicted_success = "min_predicted_success" in unusual
+    promises = any(c.predicted_success is not None for c in cells)
+
+    def axis(name: str) -> Column:
+        return Column(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
+
+    return Table(
+        cells,
+        (
+            Column("scenario", "scenario", words=True),
+            Column("clearance_mm", "clearance", text="{clearance_mm:g} mm", words=True),
+            axis("noise"),
+            axis("contact_source"),
+            Column("human_error_scale", "human error", text="{words.human_error_scale}", words=True),
+            Column("noise_mm", "noise level", text="{noise_words}", words=True),
+            Column("noise_deg"),
+            Column("tightness"),
+            Column("method", "method", words=True),
+            Column("grasp"),
+            Column("fidelity"),
+            *map(axis, _AXES[2:]),
+            Column("", "success", "rate", "{rate:percent}"),
+            Column("", "95 % interval", "interval", "{interval:percents}"),
+            Column("trials", "n"),
+            Column("successes"),
+            Column("rate"),
+            *interval_columns(),
+            Column("executed", value="executed.trials"),
+            Column("executed_rate", value="executed.rate"),
+            *interval_columns("executed.interval", "executed_low_95", "executed_high_95"),
+            Column("abstained", "abstained" * min_predicted_success),
+            Column(
+                "wrong_when_executed",
+                "wrong when executed" * min_predicted_success,
+                text="{wrong_when_executed:percent}",
+            ),
+            Column("predicted_success", "predicted success" * promises, text="{predicted_success:percent}"),
+            Column("brier"),
+            Column("as_demonstrated", value="demonstrated"),
+            Column("as_demonstrated_rate", "as demonstrated", "demonstrated_rate", "{demonstrated_rate:percent}"),
+            Column("loose_successes"),
+            Column("loose_rate", "loose", text="{loose_rate:percent}"),
+            Column("excluded"),
+            Column("failures", "failures", _all_endings, "{failures:endings}", words=True),
+        ),
+    )
+
+
+def _all_endings(cell: ConditionResult) -> str:
+    return endings(cell.failures, most=None)
+
+
+def pair_table(pairs: Sequence[Paired]) -> Table:
+    """One line per cell, method and reference."""
+    return Table(
+        pairs,
+        (
+            *condition_columns(),
+            Column("reference", "against", words=True),
+            Column("pairs", "pairs"),
+            Column("only_method"),
+            Column("only_reference"),
+            Column(
+                "",
+                "right: both, it alone, other alone, neither",
+                "both",
+                "{both}, {only_method}, {only_reference}, {neither}",
+            ),
+            Column("difference", "difference [points]", text="{difference:points} ({interval:points})"),
+            *interval_columns(),
+            Column("p_mcnemar", "p (adjusted)", "p", "{p:p} ({p_adjusted:p})"),
+            Column("p_adjusted"),
+            Column("reference_failed", value="recovered.trials"),
+            Column(
+                "recovered",
+                "recovered",
+                "recovered.successes",
+                "{recovered.successes} of {recovered.trials} ({recovered.interval:percents})",
+            ),
+            Column("recovery_rate", value="recovered.rate"),
+            *interval_columns("recovered.interval", "recovery_low_95", "recovery_high_95"),
+            Column("reference_right", value="harmed.trials"),
+            Column(
+                "harmed",
+                "harmed",
+                "harmed.successes",
+                "{harmed.successes} of {harmed.trials} ({harmed.interval:percents})",
+            ),
+            Column("harm_rate", value="harmed.rate"),
+            *interval_columns("harmed.interval", "harm_low_95", "harm_high_95"),
+            Column("planned"),
+            Column(
+                "free_difference_mm",
+                "free error, difference [mm]",
+                "free_mm",
+                "{free_mm:signed} ({free_interval.low:signed} to {free_interval.high:signed}), n {planned}",
+            ),
+            *interval_columns("free_interval", "free_low_95_mm", "free_high_95_mm"),
+        ),
+        "No method shares a condition with `uncorrected` or `paper`, with which methods are paired.",
+        (
+            "Over the same seeds: at how many of them both methods succeeded, one alone, or neither; the difference of "
+            "their success rates in points with Tango's score interval for paired proportions; McNemar's exact "
+            "p-value, and in brackets the same adjusted for all comparisons of the sweep (Holm). *Recovered* is the "
+            "share of the other's failures at which the method succeeded, *harmed* the share of the other's successes "
+            "at which it failed. The last column has the mean difference of the errors of planned poses in directions "
+            "that contacts leave free, with Student's t interval. All intervals are of 95 %."
+        ),
+    )
+
+
+def half_table(levels: Sequence[HalfLevel]) -> Table:
+    """One line per method and setting; in files a limit beyond the levels tried is empty."""
+    return Table(
+        levels,
+        (
+            *condition_columns(levels=False),
+            Column("smallest_level", value="smallest"),
+            Column("largest_level", value="largest"),
+            Column("trials", "n"),
+            Column("half_level", "half success at noise level", "noise_mm", "{text}"),
+            Column("surely_over", "surely", text="{sure_text}"),
+            Column("surely_under"),
+        ),
+        "The noise level did not vary.",
+        (
+            "The noise level at which success falls to one half, read along its logarithm. *Surely* is from the last "
+            "level with success surely over one half to the first surely under it, whatever the curve between them "
+            "(exact binomial tests, 95 %); *any* where neither is known."
+        ),
+    )

@@ -1,0 +1,53 @@
+"""The command `apo-bench assembly import`: CAD files become a scenario."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from apo_bench.cli.scenario import ClearanceMm, Fixed, MaxOverlapMm, Order, Overwrite, Up, write_new_scenario
+from apo_bench.cli.shared import Command, check_output, group, parse_path, path_option
+
+_HELP = """
+Assemblies from CAD files.
+
+Examples:
+  apo-bench assembly import jig.step --out jig.toml
+  apo-bench assembly import jig.stl --unit mm --out jig.toml
+"""
+commands = group("assembly", _HELP)
+
+
+@commands.command("import", cls=Command)
+def assembly_import(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            parser=parse_path, metavar="FILE...", help="A CAD file of several solids, or several files in one frame."
+        ),
+    ],
+    *,
+    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder beside it.")],
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the files: mm, in, m, cm, ft or um; default: as they state.")
+    ] = None,
+    up: Up = None,
+    fixed: Fixed = None,
+    order: Order = None,
+    clearance_mm: ClearanceMm = None,
+    max_overlap_mm: MaxOverlapMm = 0.2,
+    overwrite: Overwrite = False,
+) -> None:
+    """Make a scenario from CAD files: parts, contacts, an order, starts and grasps.
+
+    Examples:
+      apo-bench assembly import jig.step --out jig.toml
+      apo-bench assembly import base.step key.step pin.step --order key,pin --out clamp.toml
+    """
+    from apo_bench.importers.assembly.from_cad import import_assembly
+
+    check_output(out, "--out", ".toml", new=not overwrite)
+    poses, lines = import_assembly(files, out.with_name(f"{out.stem}_parts"), unit)
+    typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
+    source = ", ".join(file.name for file in files)
+    write_new_scenario(poses, [], source, out, (up, fixed, order, clearance_mm, max_overlap_mm))

@@ -1,0 +1,60 @@
+"""The command `apo-bench detect-contacts`: contacts from observed poses."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench.cli.shared import (
+    AsJson,
+    DeviationDeg,
+    DeviationMm,
+    ScenarioArgument,
+    path_option,
+    print_json,
+    print_table,
+    takes,
+    trial_options,
+)
+from apo_bench.errors import require_known
+from apo_bench.io import redirect_output
+from apo_bench.records import DETECTED
+
+
+@takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
+def detect_contacts_command(
+    scenario: ScenarioArgument,
+    *,
+    observation: Annotated[Path | None, path_option("Use this observation in place of a trial.")] = None,
+    deviation_mm: DeviationMm = None,
+    deviation_deg: DeviationDeg = None,
+    contact_source: Annotated[str, typer.Option(help="detected, or detected-jointly.")] = "detected",
+    as_json: AsJson = False,
+    **options: Any,
+) -> None:
+    """Detect contacts in observed poses, and compare them with those of the scenario.
+
+    Examples:
+      apo-bench detect-contacts stick_in_tower --noise-level 2 --seed 3
+      apo-bench detect-contacts stick_in_tower --observation docs/seen.csv --contact-source detected-jointly
+    """
+    from apo_bench.formats.deviations import assumed_deviations
+    from apo_bench.trial.detected_contacts import detect_by
+    from apo_bench.trial.request import load_or_draw_observation
+    from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
+
+    require_known("contact source", contact_source, DETECTED)
+    with redirect_output(as_json):
+        observed, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
+    form = detection_form(scenario, contact_source, observed, detect_by(observed, contact_source), assumed)
+    if as_json:
+        print_json(form)
+        return
+    print_table(evidence_table(form), 140)
+    lines = [*confidence_lines(form), *difference_lines(form)]
+    if assumed:
+        lines.append(assumed_deviations(deviation_mm, deviation_deg))
+    if not observed.observed.all():
+        missing = ", ".join(str(k + 1) for k, seen in enumerate(observed.observed) if not seen)
+        lines.append(f"no contact is detected at operations that were not observed: {missing}")
+    typer.echo("\n" + "\n".join(lines))

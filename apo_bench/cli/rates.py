@@ -1,0 +1,36 @@
+"""Tables of a sweep on the terminal."""
+
+from collections.abc import Iterable, Sequence
+
+import typer
+from rich.table import Table as TerminalTable
+
+from apo_bench.benchmark.analysis import ConditionResult, confusions
+from apo_bench.benchmark.report.tables.conditions import condition_table
+from apo_bench.benchmark.report.tables.methods import prediction_summary
+from apo_bench.benchmark.report.tables.table import Table
+from apo_bench.cli.shared import print_table
+from apo_bench.io import clean
+from apo_bench.records import TrialRecord
+
+
+def print_report_table(table: Table) -> None:
+    """Print the columns of a table that people read."""
+    printed = TerminalTable(box=None, pad_edge=False)
+    for column in table.shown:
+        printed.add_column(column.head, justify="left" if column.words else "right")
+    for line in table.lines:
+        printed.add_row(*map(clean, line))
+    print_table(printed)
+
+
+def print_rates(cells: Sequence[ConditionResult]) -> None:
+    """Print success rates with their intervals, and how many trials do not count."""
+    print_report_table(condition_table(cells))
+    if excluded := sum(cell.excluded for cell in cells):
+        typer.echo(f"Trials that do not count, because the demonstration itself failed: {excluded:,}.")
+
+
+def print_prediction(records: Iterable[TrialRecord]) -> None:
+    """Print in one line how often plans predicted what happened."""
+    typer.echo(prediction_summary(confusions(records)[-1]))

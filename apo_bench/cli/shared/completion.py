@@ -1,0 +1,42 @@
+"""Names that a shell offers when Tab is pressed, from short lists and folders; no file is read.
+
+Where no name begins like the typed text, a shell offers files, as scenarios, noise models and arms may be files.
+"""
+
+from collections.abc import Callable
+
+from apo_bench.records import DETECTED, FOREIGN_ARMS, METHODS, SETTINGS, WRONG_CONTACTS
+from apo_bench.resources import folder
+
+Completion = Callable[[str], list[str]]
+"""The typed part of a word -> the words that it may become."""
+
+
+def offered_names(setting: str) -> list[str]:
+    """Names that come with the package for a setting or a `scenario`, and prefixes of others."""
+    if setting == "scenario":
+        return _stems("scenarios", "*.toml")
+    if setting == "noise":
+        from apo_bench.perception.observation.noise import NOISES
+
+        return [*NOISES, *_stems("assets", "noise/*.toml")]
+    if setting == "arm":
+        return [SETTINGS["arm"].default, *_stems("assets", "arms/*.toml"), *FOREIGN_ARMS]
+    if setting == "contact_source":
+        return [SETTINGS["contact_source"].default, *DETECTED, *WRONG_CONTACTS]
+    return [*METHODS, "spiral-search"] if setting == "method" else [*SETTINGS[setting].choices]
+
+
+def completion(setting: str) -> Completion:
+    """Offer names that begin like the text after the last comma."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        names = [name for name in offered_names(setting) if name.startswith(last) and name not in before.split(",")]
+        return [f"{before}{comma}{name}" for name in names]
+
+    return complete
+
+
+def _stems(where: str, pattern: str) -> list[str]:
+    return sorted(path.stem for path in folder(where).glob(pattern))

@@ -1,0 +1,82 @@
+"""Options for the settings of a trial, made from the description of each setting."""
+
+from collections.abc import Callable, Iterable
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from apo_bench.cli.shared.arguments import path_option
+from apo_bench.cli.shared.completion import completion
+from apo_bench.cli.shared.values import parse_list
+from apo_bench.records import NOISE_LEVEL, SETTINGS, SettingInfo
+from apo_bench.records.run.replay_command import milli, number
+
+Command = TypeVar("Command", bound=Callable[..., None])
+
+
+def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
+    """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**options`."""
+
+    def wrap(command: Command) -> Command:
+        own = signature(command, eval_str=True)
+        parameters = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        plain = [p for p in parameters if p.kind is not Parameter.KEYWORD_ONLY]
+        vars(command)["__signature__"] = own.replace(parameters=[*plain, *options, *parameters[len(plain) :]])
+        return command
+
+    return wrap
+
+
+def trial_options(*names: str) -> list[Parameter]:
+    """Options of one trial for these settings, or for all; each may be left out."""
+    infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
+    return [_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
+
+
+def sweep_options() -> list[Parameter]:
+    """Options of a sweep: its axes, and the settings that all of its trials share."""
+    axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
+    shared = [info for info in SETTINGS.values() if info.shared]
+    return [
+        *map(_axis_option, [*axes, SETTINGS["noise_mm"], SETTINGS["noise_deg"]]),
+        *map(_trial_option, shared),
+    ]
+
+
+def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
+    """The values of an axis: `0,0.5,1` or `uncorrected,contact`."""
+    kind = str if info.is_text else int if info.is_whole else float
+    return parse_list(text, f"--{info.option}", kind)
+
+
+def shown_default(info: SettingInfo) -> str:
+    """The default of a setting, in the unit of its option."""
+    return info.usual or _in_option_unit(info, info.default)
+
+
+def _trial_option(info: SettingInfo) -> Parameter:
+    description = f"{info.help}; default: {shown_default(info)}."
+    if info.name == "secret_seed":
+        return _parameter(info, Path, path_option(description))
+    return _parameter(info, getattr(info.kind, "__origin__", info.kind), _option(info, description))
+
+
+def _axis_option(info: SettingInfo) -> Parameter:
+    usual = ",".join(_in_option_unit(info, value) for value in info.swept) or shown_default(info)
+    return _parameter(info, str, _option(info, f"{info.help}; several with commas; default: {usual}."))
+
+
+def _option(info: SettingInfo, description: str) -> Any:
+    named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
+    return typer.Option(help=description, autocompletion=completion(info.name) if named else None)
+
+
+def _parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:
+    annotation = Annotated[kind | None, option]
+    return Parameter(info.keyword, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+def _in_option_unit(info: SettingInfo, value: Any) -> str:
+    return str(value) if info.is_text else number(milli(value) if info.scale != 1.0 else value)

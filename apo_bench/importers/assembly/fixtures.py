@@ -1,0 +1,127 @@
+"""Fixtures for parts that do not stand as they will be put: columns below, and walls where these are not enough."""
+
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from apo_bench.geometry import Array, Box, Solid, all_corners, intrusion_depths, passage
+from apo_bench.importers.assembly.staging import is_carried
+from apo_bench.scenario.parts.allowed import THINNEST_M
+
+FLOOR_M = 0.002
+"""The height of the lowest point of a part in its fixture over the table."""
+_CELL_M = 0.004
+_MOST = 9
+"""Columns are about so wide, and at most so many each way."""
+_BESIDE_M = 0.0025
+"""Columns end so far inside of the box around the part, for fingers beside it."""
+_RAYS = 3
+"""Rays each way by which the height of a column is found."""
+_INSET_M = 1e-6
+_BELOW_M = 1e-5
+"""A part begins so far above its nest, and settles."""
+_WALL_M = 0.005
+_PLAY_M = 0.00015
+_CORNERS = np.array([[-1.0, -1, 0], [-1, 1, 0], [1, -1, 0], [1, 1, 0]])
+_WALLED = 0.4
+_HIGHEST_M = 0.02
+"""Walls are so thick, so far from the part, and so high: a part of its height, but no higher than this."""
+
+
+def make_fixture(name: str, solid: Solid, R: Array) -> Solid:
+    """Return the fixture of a solid with an orientation, (3, 3): boxes along the axes of the world, over the table.
+
+    Its frame is right below that of the solid, on the table; the solid stands higher by `FLOOR_M` than on the table.
+    """
+    corners = all_corners(solid.pieces)[0] @ R.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    rise = FLOOR_M - low[2]
+    T = np.eye(4)
+    T[:3] = np.column_stack([R, [0.0, 0.0, rise]])
+    inset = np.minimum(_BESIDE_M, (high - low)[:2] / 4)
+    fitted = [_fit_height(each, solid, T) for each in _columns(solid, R, rise, low[:2] + inset, high[:2] - inset)]
+    feet = np.concatenate([np.zeros((0, 2)), *((b.center + _CORNERS * b.half)[:, :2] for b in fitted if b.half[2] > 0)])
+    middle = R @ solid.centroid
+    walls = [] if is_carried(feet, middle, float(middle[2] - low[2])) else _walls(low, high)
+    beside = _WALL_M if walls else -inset
+    plate = _box_between((*(low[:2] - beside), 0.0), (*(high[:2] + beside), FLOOR_M - _BELOW_M))
+    columns = [box for box in fitted if box.half[2] > plate.half[2] + _INSET_M and box.half.min() > THINNEST_M]
+    boxes = tuple(Box(f"p{i}", b.center, b.half) for i, b in enumerate((plate, *columns, *walls), start=1))
+    return Solid(name=name, faces={}, pieces=boxes, centroid=np.zeros(3), volume=1.0)
+
+
+def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> list[Box]:
+    """Columns as high as the lowest point above them, those of one height in a row as one."""
+    cells = np.clip(np.ceil((high - low) / _CELL_M), 2, _MOST).astype(int)
+    x, y = (np.linspace(low[i], high[i], 1 + cells[i]) for i in (0, 1))
+    boxes = []
+    for y0, y1 in pairwise(y):
+        tops = [_lowest_above(solid, R, (x0, y0), (x1, y1)) + rise - _BELOW_M for x0, x1 in pairwise(x)]
+        for top, alike in groupby(range(len(tops)), key=lambda i: round(tops[i], 6)):
+            run = list(alike)
+            if np.isfinite(top):
+                boxes.append(_box_between((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
+    return boxes
+
+
+def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple[float, float]) -> float:
+    """How high the lowest point of a turned solid is above a rectangle, [m]; infinite where there is none."""
+    sides = [np.linspace(a + _INSET_M, b - _INSET_M, _RAYS) for a, b in zip(begin, end, strict=True)]
+    grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_RAYS**2)], axis=1)
+    return min(float(passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
+
+
+def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
+    """A column as high as the solid at T leaves it room; of no height if that is not found soon."""
+    low = (box.center - box.half)[:2]
+    high = (box.center + box.half)[:2]
+    for _ in range(3):
+        depth = float(intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
+        if depth <= 0.0:
+            return box
+        box = _box_between((*low, 0.0), (*high, 2 * max(0.0, box.half[2] - depth)))
+    return _box_between((*low, 0.0), (*high, 0.0))
+
+
+def _walls(low: Array, high: Array) -> list[Box]:
+    """Four walls around a box, on the table."""
+    top = FLOOR_M + min(_WALLED * (high[2] - low[2]), _HIGHEST_M)
+    middle, reach = (low + high)[:2] / 2, (high - low)[:2] / 2 + _PLAY_M
+    boxes = []
+    for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
+        half = np.array([*reach, top / 2])
+        half[axis] = _WALL_M / 2
+        center = np.array([*middle, top / 2])
+        center[axis] += sign * (reach[axis] + _WALL_M / 2)
+        boxes.append(Box("", center, half))
+    return boxes
+
+
+def _box_between(low: Sequence[float], high: Sequence[float]) -> Box:
+    """The box from its lowest corner to its highest."""
+    return Box("", np.add(low, high) / 2, np.subtract(high, low) / 2)
+
+
+def fixture_xml(fixture: Solid) -> str:
+    """Return the part file."""
+    geoms = [
+        f'      <geom name="{b.name}" pos="{_numbers(b.center)}" size="{_numbers(b.half)}"/>' for b in fixture.pieces
+    ]
+    return "\n".join(
+        [
+            f"<mujoco model={quoteattr(fixture.name)}>",
+            '  <default><geom type="box" density="600" friction="0.3 0.005 0.0001" rgba="0.55 0.6 0.65 1"/></default>',
+            "  <worldbody>",
+            f"    <body name={quoteattr(fixture.name)}>",
+            *geoms,
+            "    </body>",
+            "  </worldbody>",
+            "</mujoco>\n",
+        ]
+    )
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{float(x):.9g}" for x in values)

@@ -1,0 +1,108 @@
+"""The TOML file of a gripper: how far it opens at which command, and how hard it pushes."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from apo_bench.errors import require
+from apo_bench.geometry import Array
+from apo_bench.io import Finite, NotNegative, Positive, Table, Text, read_typed
+from apo_bench.resources import folder
+from apo_bench.scenario.values import AnyPose
+from apo_bench.simulation.arms.arm import Hand
+
+Numbers = Annotated[tuple[Finite, ...], Meta(min_length=2, max_length=64)]
+Rows = Annotated[tuple[tuple[Finite, ...], ...], Meta(min_length=2, max_length=64)]
+
+
+class GripperTable(Table, frozen=True, kw_only=True):
+    """The keys of a gripper file; names are those in its MJCF, openings are of each finger."""
+
+    schema: Literal["apo-bench/gripper/1"]
+    mount: Text | None = None
+    """The body that carries the fingers; None: the flange of the arm."""
+    tip: AnyPose
+    """Between the fingertips, in the mount: z ahead, x along the closing direction."""
+    actuators: tuple[Text, ...]
+    joints: tuple[Text, ...]
+    pads: tuple[Text, Text]
+    """A geom of each side, or a body, of which its first box counts."""
+    pads_apart_mm: Finite
+    """How much farther apart the middles of these geoms are than the surfaces that hold."""
+    force_n: Positive
+    """How hard each pad pushes on a part of half the opening."""
+    squeeze_mm: NotNegative
+    """How far inside the part its fingers are sent for that, each."""
+    friction: NotNegative
+    seconds: Positive
+    """How long it takes to close or open at most."""
+    drive_scale: Positive = 1.0
+    """How many times as strong as in the model its drive is."""
+    opening_mm: Numbers
+    """Ascending; below zero where pads would be inside each other."""
+    commands: Rows
+    """Of the actuators at each opening, in their own units."""
+    states: Rows
+    """Of the joints at each opening of the empty hand, [rad] or [m]."""
+
+    def __post_init__(self) -> None:
+        n = len(self.opening_mm)
+        if not (np.diff(self.opening_mm) > 0.0).all():
+            raise ValueError("'opening_mm' must ascend.")
+        if [len(row) for row in self.commands] != [len(self.actuators)] * n:
+            raise ValueError(f"'commands' needs {n} rows of {len(self.actuators)} numbers.")
+        if [len(row) for row in self.states] != [len(self.joints)] * n:
+            raise ValueError(f"'states' needs {n} rows of {len(self.joints)} numbers.")
+
+    def tip_frame(self, path: Path) -> Array:
+        """The tip in the mount, (4, 4), [m].
+
+        Args:
+            path: The file, for messages.
+        """
+        return self.tip.matrix(f"{path}, tip")
+
+    def hand(self, prefix: str, pads: tuple[str, str]) -> Hand:
+        """The hand of an arm.
+
+        Args:
+            prefix: Of the names of the gripper in the arm.
+            pads: The geoms of the arm.
+        """
+        return Hand(
+            actuators=tuple(prefix + name for name in self.actuators),
+            joints=tuple(prefix + name for name in self.joints),
+            opening=1e-3 * np.array(self.opening_mm),
+            commands=np.array(self.commands),
+            states=np.array(self.states),
+            force_n=self.force_n,
+            squeeze_m=1e-3 * self.squeeze_mm,
+            friction=self.friction,
+            seconds=self.seconds,
+            pads=pads,
+            thick_m=1e-3 * self.pads_apart_mm,
+        )
+
+
+def gripper_path(name: str, place: Path) -> Path:
+    """The file of a gripper by short name, or a TOML file relative to the folder `place`.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    grippers = folder("assets") / "grippers"
+    path = place / name if name.endswith(".toml") else grippers / f"{name}.toml"
+    known = ", ".join(sorted(each.stem for each in grippers.glob("*.toml")))
+    require(path.is_file(), f"unknown gripper '{name}'; known are {known}, or give the path of a gripper file.")
+    return path
+
+
+def read_gripper(path: Path) -> GripperTable:
+    """What a gripper file states.
+
+    Raises:
+        InputError: A key or a value that a gripper file cannot have, naming file and key.
+    """
+    return read_typed(path, GripperTable, "gripper file")

@@ -1,0 +1,67 @@
+"""A picture of what a depth camera estimates from a demonstration: a row for each change that it finds."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench.io import default_looks, save_figure
+from apo_bench.perception.depth_camera.follow import Event
+from apo_bench.viz.depth_run import DepthRun
+
+_TITLES = ("camera image", "depth [m]", "minus the depth before [mm]", "appeared, vanished", "fitted model")
+_APPEARED = "#1b7837"
+_VANISHED = "#b2182b"
+_OUTLINE = "#d95f02"
+_AROUND = 20  # pixels around the changes
+_LARGEST_MM = 60.0
+
+
+@default_looks()
+def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
+    """Draw every change in one view of the depth camera, counted from 0."""
+    from matplotlib.figure import Figure
+
+    rows = max(1, len(run.events))
+    figure = Figure(figsize=(15.0, 2.55 * rows + 0.3), layout="constrained")
+    grid = figure.subplots(rows, len(_TITLES), squeeze=False, subplot_kw={"xticks": [], "yticks": []})
+    for axes, title in zip(grid[0], _TITLES, strict=True):
+        axes.set_title(title, fontsize=11)
+    for row, event in zip(grid, run.events, strict=False):
+        row[0].set_ylabel(_describe(event), fontsize=9)
+        _draw_row(row, run, event, view)
+    # the pictures show the pixels that ever changed, and some around
+    changed = [event.regions[view].appeared | event.regions[view].vanished for event in run.events]
+    if np.any(changed):
+        v, u = np.nonzero(np.any(changed, axis=0))
+        for axes in grid[:, 1:].ravel():
+            axes.set(xlim=(u.min() - _AROUND, u.max() + _AROUND), ylim=(v.max() + _AROUND, v.min() - _AROUND))
+    save_figure(figure, out, dpi=72)
+
+
+def _describe(event: Event) -> str:
+    moved = ", ".join(sorted(event.moved)) or "nothing"
+    if event.operation is None:
+        return f"{moved}: unexpected"
+    found = "no pose" if event.found is None else f"{100 * event.found.explained:.0f} % explained"
+    return f"{event.operation + 1}: {moved}, {found}"
+
+
+def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
+    from matplotlib.colors import ListedColormap
+
+    after = run.images[event.last][view]
+    change = 1e3 * (after - run.images[event.first][view])
+    regions = event.regions[view]
+    low = np.nanmin(after)
+    row[0].imshow(run.watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
+    row[1].imshow(after, cmap="viridis_r", vmin=low, vmax=np.nanquantile(after, 0.95))
+    row[2].imshow(change, cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)
+    for axes in row[3:]:
+        axes.imshow(after, cmap="gray_r", vmin=low, vmax=2.0 * np.nanmax(after))
+    for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
+        row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
+    if event.found is not None and event.model is not None:
+        camera = run.watched.finder.views[view]
+        distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
+        row[4].contour(np.isfinite(distance.reshape(after.shape)), levels=[0.5], colors=_OUTLINE, linewidths=1.2)

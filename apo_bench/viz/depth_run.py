@@ -1,0 +1,118 @@
+"""One demonstration through the depth camera, and the poses that it estimates, as a table and as one JSON object."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.errors import require
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.depth_camera.follow import Event
+from apo_bench.perception.depth_camera.range_finder import RangeFinder
+from apo_bench.records import DEPTH_CAMERA, check
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene import build_scene
+from apo_bench.simulation.sensor.rays import ModelRays
+from apo_bench.simulation.sensor.watch import DemonstrationImages
+from apo_bench.trial.stages import (
+    OBSERVATION,
+    SimulatedDemonstration,
+    demonstration_failure,
+    range_sensor,
+    simulate_demonstration,
+    stream,
+)
+from apo_bench.viz.tables import form_table
+
+_SCHEMA = "apo-bench/depth/1"
+_COLUMNS = {
+    "operation": "d",
+    "moves": "",
+    "found": "",
+    "time_s": ".2f",
+    "error_mm": ".2f",
+    "error_deg": ".2f",
+    "deviation_mm": ".2f",
+    "deviation_deg": ".2f",
+    "explained": ".0%",
+}
+
+
+class DepthRun(NamedTuple):
+    """A demonstration, the images of it, and the events that the depth camera finds in them."""
+
+    scenario: str
+    simulated: SimulatedDemonstration
+    watched: DemonstrationImages
+    images: tuple[Array, ...]
+    """Measured depth images, (views, height, width) each, [m]."""
+    events: tuple[Event, ...]
+    models: ModelRays
+    """The parts as the depth camera knows them."""
+
+
+def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scale: float) -> DepthRun:
+    """Demonstrate, and estimate the poses: the same images and poses as in a trial with these settings.
+
+    Raises:
+        InputError: A setting that is not allowed.
+        RuntimeError: The demonstration itself failed.
+    """
+    check("noise_mm", noise_mm)
+    check("human_error_scale", human_error_scale)
+    check("seed", seed)
+    scene = build_scene(load_scenario(scenario))
+    simulated = simulate_demonstration(scene, human_error_scale, seed, DEPTH_CAMERA)
+    if simulated.demonstration.code != "ok" or simulated.images is None:
+        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed.")
+    sensor = range_sensor(scene, simulated, noise_mm)
+    images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
+    events = sensor.events(simulated.demonstration, images)
+    models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
+    return DepthRun(scene.scenario.name, simulated, simulated.images, images, events, models)
+
+
+def check_view(view: int) -> None:
+    """Refuse the number of a view, from 1, that the depth camera does not have."""
+    views = len(RangeFinder().views)
+    require(1 <= view <= views, f"--view must be from 1 to {views}, got {view}.")
+
+
+def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:
+    """The JSON object: operations from 1; the error is that of the depth camera, without the human's."""
+    operations = []
+    events = {event.operation: event for event in run.events}
+    for k, operation in enumerate(run.simulated.demonstration.assembly.operations):
+        event = events.get(k)
+        form = {"operation": k + 1, "moves": list(operation.moves), "found": False}
+        operations.append(form if event is None or event.found is None else form | _estimate_form(event, run, k))
+    return {
+        "schema": _SCHEMA,
+        "scenario": run.scenario,
+        "noise_mm": noise_mm,
+        "seed": seed,
+        "human_error_scale": human_error_scale,
+        "images_s": [round(t, 3) for t in run.watched.times_s],
+        "operations": operations,
+    }
+
+
+def _estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
+    found = event.found
+    deviation = np.sqrt(np.diag(found.covariance))
+    error = pose.log(pose.inverse(found.T) @ run.simulated.demonstration.poses[k])
+    packed = pose.pack(found.T)
+    return {
+        "found": True,
+        "time_s": round(run.watched.times_s[event.last], 3),
+        "explained": {name: round(share, 3) for name, share in event.explained.items()},
+        "pose": [*(1e3 * packed[:3]).tolist(), *packed[3:].tolist()],
+        "deviation_mm": (1e3 * deviation[:3]).tolist(),
+        "deviation_deg": np.degrees(deviation[3:]).tolist(),
+        "error_mm": float(1e3 * np.linalg.norm(error[:3])),
+        "error_deg": float(np.degrees(np.linalg.norm(error[3:]))),
+    }
+
+
+def depth_table(form: dict[str, Any]) -> Any:
+    """The operations of `depth_form` as a table of `rich`."""
+    return form_table(form["operations"], _COLUMNS)

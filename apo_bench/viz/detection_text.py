@@ -1,0 +1,98 @@
+"""Detected contacts as a table, as sentences, and as one JSON object."""
+
+from math import degrees
+from typing import Any
+
+from apo_bench.assembly import Assembly, Contact, Observation
+from apo_bench.perception.detection.evidence import DetectedContacts
+from apo_bench.trial.detected_contacts import count_contacts
+from apo_bench.viz.tables import form_table
+
+_SCHEMA = "apo-bench/detected-contacts/1"
+_SURE = 0.9  # a set of contacts that is less likely is uncertain
+_COLUMNS = {
+    "operation": "d",
+    "manipulated": "",
+    "environment": "",
+    "observed_gap_mm": "z.2f",
+    "gap_mm": "z.2f",
+    "allowed_gap_mm": ".2f",
+    "angle_deg": "z.2f",
+    "allowed_angle_deg": ".2f",
+    "overlap": ".0%",
+    "in_scenario": "",
+}
+
+
+def evidence_table(form: dict[str, Any]) -> Any:
+    """A table of `rich` with a line for each contact of `detection_form`: measured and allowed values."""
+    return form_table(form["contacts"], _COLUMNS)
+
+
+def difference_lines(form: dict[str, Any]) -> list[str]:
+    """How the detected contacts differ from those of the scenario."""
+    right = form["contacts_true_positive"]
+    whole = right + form["contacts_false_negative"]
+    line = f"{right} of the {whole} contacts of the scenario are detected, and {form['contacts_false_positive']} others"
+    return [line, *(f"missed: {c['operation']}: {c['manipulated']} on {c['environment']}" for c in form["missed"])]
+
+
+def confidence_lines(form: dict[str, Any]) -> list[str]:
+    """How probable the set of contacts is, and what the next best one would change; nothing without a comparison."""
+    if form["probability"] is None:
+        return []
+    doubt = "uncertain: " * (form["probability"] < _SURE)
+    line = f"{doubt}this set of contacts is right with probability {form['probability']:.2f}, of those compared"
+    if form["next"] is not None:
+        change = [f"{word} {', '.join(form['next'][word])}" for word in ("with", "without") if form["next"][word]]
+        line += f"; the next ({form['next']['probability']:.2f}) is {' and '.join(change)}"
+    return [line]
+
+
+def detection_form(
+    scenario: str, contact_source: str, observation: Observation, detected: DetectedContacts, assumed: bool
+) -> dict[str, Any]:
+    """The JSON object: mm and degrees, operations from 1."""
+    right = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
+    found = {(each.made, each.contact) for each in detected.evidence}
+    rival = detected.rival
+    mine = _name_contacts(detected.assembly)
+    others = mine if rival is None else _name_contacts(rival.assembly)
+    return {
+        "schema": _SCHEMA,
+        "scenario": scenario,
+        "contact_source": contact_source,
+        "deviation_assumed": assumed,
+        "contacts": [
+            _contact_form(each.made, each.contact)
+            | {
+                "observed_gap_mm": _to_mm(each.seen_gap_m),
+                "gap_mm": _to_mm(each.gap_m),
+                "allowed_gap_mm": _to_mm(each.most.gap_m),
+                "angle_deg": degrees(each.angle_rad),
+                "allowed_angle_deg": degrees(each.most.angle_rad),
+                "overlap": each.share,
+                "in_scenario": (each.made, each.contact) in right,
+            }
+            for each in detected.evidence
+        ],
+        "missed": [_contact_form(*missed) for missed in sorted(right - found, key=str)],
+        **count_contacts(observation.assembly, detected.assembly),
+        "probability": detected.probability,
+        "next": rival
+        and {"probability": rival.probability, "with": sorted(others - mine), "without": sorted(mine - others)},
+    }
+
+
+def _name_contacts(assembly: Assembly) -> set[str]:
+    """`5: cube.px on castle2.nx` of each contact."""
+    return {f"{relation.made + 1}: {relation.contact}" for relation in assembly.relations()}
+
+
+def _contact_form(operation: int, contact: Contact) -> dict[str, Any]:
+    return {"operation": operation + 1} | {key: str(face) for key, face in contact._asdict().items()}
+
+
+def _to_mm(metres: float) -> float:
+    """Rounded, and never -0."""
+    return round(1e3 * metres, 6) + 0.0

@@ -1,0 +1,173 @@
+"""What the contacts determine, as sentences, as a table, and as one JSON object."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly import Hypothesis, spell
+from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation
+from apo_bench.correction.relation_equations import RelationHold
+from apo_bench.correction.shared_estimate import SharedEstimate
+from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
+from apo_bench.geometry import Array
+from apo_bench.io import grouped, listed_words, with_article
+
+_SCHEMA = "apo-bench/explanation/1"
+PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
+"""How well each part is known at the end: keys of a part in `dof_form`, with their formats."""
+_OFF_M = 1e-6  # a turn about a point nearer to the origin of the part is about the origin
+
+
+def count_directions(explanation: Explanation) -> str:
+    """`the contacts fix 13 of 18 directions; 5 are free and 14 of 27 equations redundant`."""
+    redundant = f"{explanation.redundant} of {explanation.rank + explanation.redundant} equations redundant"
+    fixed = f"{explanation.rank} of {6 * len(explanation.goals)} directions"
+    return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
+
+
+def dof_lines(explanation: Explanation) -> list[str]:
+    """One line for each operation (fixed by which parts, what is free), then one for each shared error."""
+    lines = [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_free(explanation, o)}" for o in explanation.operations]
+    return [*lines, *map(_shared, explanation.shared)]
+
+
+def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
+    """`0.92: without the observation of operation 2`, one each, if there is more than one."""
+    lines = [f"{each.weight:.2g}: {each.sentence or 'as observed'}" for each in hypotheses]
+    return lines if len(lines) > 1 else []
+
+
+def format_deviation(free: FreeDirection) -> str:
+    """`1.00 mm` or `0.58 deg`."""
+    return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
+
+
+def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
+    """The JSON object: mm, degrees, operations from 1; a spectral gap of null is infinite."""
+    return {
+        "schema": _SCHEMA,
+        "scenario": scenario,
+        "operations": [
+            {
+                "operation": o.operation + 1,
+                "part": o.part,
+                "rank": o.rank,
+                "fixed": list(o.fixed),
+                "free": [_free_form(free, explanation.goals[o.operation]) for free in o.free],
+                "through": list(map(_hold_form, o.through)),
+                "agreeing": list(map(_hold_form, o.agreeing)),
+                "covariance_mm_deg": covariance_form(o.covariance),
+            }
+            for o in explanation.operations
+        ],
+        "parts": [
+            {
+                "part": part.part,
+                "placed": part.placed + 1,
+                "odl": spell(part.odl),
+                **pose_form(part.pose),
+                "rank": part.rank,
+                "fixed": list(part.fixed),
+                "free": [_free_form(free, part.pose) for free in part.free],
+                "deviation_mm": (part.deviations * TO_MM_DEG)[:3].tolist(),
+                "deviation_deg": (part.deviations * TO_MM_DEG)[3:].tolist(),
+                "covariance_mm_deg": covariance_form(part.covariance),
+            }
+            for part in explanation.parts
+        ],
+        "rank": explanation.rank,
+        "freedom": explanation.freedom,
+        "redundant": explanation.redundant,
+        "shared": [
+            {
+                "name": estimate.error.name,
+                "operations": [k + 1 for k in estimate.error.operations],
+                "twist_mm_deg": (estimate.twist * TO_MM_DEG).tolist(),
+                "covariance_mm_deg": covariance_form(estimate.covariance),
+            }
+            for estimate in explanation.shared
+        ],
+        "left_out": [k + 1 for k in explanation.left_out],
+        "spectral_gap": explanation.spectral_gap if np.isfinite(explanation.spectral_gap) else None,
+    }
+
+
+def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
+    """The hypotheses as JSON objects: operations from 1, poses and covariances in mm and degrees."""
+    return [
+        {
+            "weight": each.weight,
+            "sentence": each.sentence,
+            "left_out": [k + 1 for k in each.left_out],
+            "dropped": list(each.dropped),
+            "operations": list(map(pose_form, each.poses)),
+            "covariances_mm_deg": None if each.covariance is None else list(map(covariance_form, each.covariance)),
+        }
+        for each in hypotheses
+    ]
+
+
+def _shared(estimate: SharedEstimate) -> str:
+    """`camera: off by (-0.30 ± 0.50, 1.90 ± 0.30, 0.10 ± 0.40) mm and (..) deg, in its frame`."""
+    numbers = zip(estimate.twist * TO_MM_DEG, estimate.deviations * TO_MM_DEG, strict=True)
+    each = [f"{x:.2f} ± {s:.2f}" for x, s in numbers]
+    frame = "in the frame of the part" if estimate.error.frame is None else "in its frame"
+    return f"{estimate.error.name}: off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
+
+
+def _fixed(o: OperationExplanation) -> str:
+    if not o.through:
+        return "no contact fixes anything"
+    others = dict.fromkeys(part for hold in o.through for part in sorted(hold.parts) if part != o.part)
+    names = [hold.relation + ("" if hold.lost is None else f" until operation {hold.lost + 1}") for hold in o.through]
+    agreeing = [hold.relation for hold in o.agreeing]
+    agrees = f"; {listed_words(agreeing)} agree{'s' * (len(agreeing) == 1)}" if agreeing else ""
+    return f"{', '.join(o.fixed)} fixed by {listed_words(map(with_article, others))} ({', '.join(names)}{agrees})"
+
+
+def _free(explanation: Explanation, o: OperationExplanation) -> str:
+    """Free directions, those that need the same other parts together."""
+    groups = []
+    for along, some in grouped((free.along, free) for free in o.free).items():
+        others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
+        alone = "chosen" if o.operation in explanation.left_out else "kept as observed"
+        how = f"together with {listed_words(others)}" if along else alone
+        names = ", ".join(f"{free.direction}{_about(free)}" for free in some)
+        groups.append(f"{names} free, {how}, {', '.join(map(format_deviation, some))}")
+    return "; ".join(groups) or "nothing is free"
+
+
+def _about(free: FreeDirection) -> str:
+    """The point of a turn, if it is not the origin of the part."""
+    is_off = free.direction.turns and np.abs(free.direction.point).max() >= _OFF_M
+    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in free.direction.point)}) mm" if is_off else ""
+
+
+def _deviation(free: FreeDirection) -> float:
+    return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
+
+
+def _free_form(free: FreeDirection, T: Array) -> dict[str, Any]:
+    """A twist per mm of a shift or per degree of a turn; its axis in the frame of the part and in the world."""
+    d = free.direction
+    return {
+        "name": str(d),
+        "twist_mm_deg": (d.twist * TO_MM_DEG / TO_MM_DEG[3 if d.turns else 0]).tolist(),
+        "axis": d.axis.tolist(),
+        "axis_world": (T[:3, :3] @ d.axis).tolist(),
+        **({"point_mm": (d.point * 1e3).tolist()} if d.turns else {}),
+        "deviation_deg" if d.turns else "deviation_mm": _deviation(free),
+        "with": [k + 1 for k in free.along],
+    }
+
+
+def _hold_form(hold: RelationHold) -> dict[str, Any]:
+    return {
+        "relation": hold.relation,
+        "parts": list(hold.parts),
+        "made": hold.made + 1,
+        "lost": None if hold.lost is None else hold.lost + 1,
+        "equation": spell(hold.word),
+        "operations": sorted({term.operation + 1 for term in hold.word}),
+    }

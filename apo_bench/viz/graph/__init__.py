@@ -1,1 +1,0 @@
-"""The relation graph, drawn as in the paper."""

@@ -1,0 +1,107 @@
+"""A picture of a relation graph, as Fig. 7: each part above the parts that it lies on, an arrow for each contact."""
+
+from collections.abc import Mapping
+from graphlib import TopologicalSorter
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from apo_bench.assembly import ArcResiduals, Graph, Node
+from apo_bench.io import default_looks, save_figure
+
+_INK = "#222222"
+_GONE = "#8A8A8A"
+_ALARM = "#C8102E"
+_GROUND = "#E4E4E4"
+_PALE = 0.75  # share of white in the colour of a part
+_DASHES = (0, (4, 2.5))
+_DASH_DOTS = (0, (9, 2, 1.5, 2))
+_ROW_IN = 1.2  # from row to row
+_COLUMN_IN = 1.6  # from column to column
+_BOX_IN = (1.3, 0.5)  # width and height of a box
+_BEND = 0.4  # of an arrow that passes a row
+_LABEL_AT = 0.4  # of the way from the upper to the lower box
+
+Place = tuple[float, float]
+
+
+def place_nodes(graph: Graph) -> dict[Node, Place]:
+    """Column and row of each part: one row above the highest part that it lies on, near the parts below it."""
+    below = {node: [arc.environment for arc in graph.arcs if arc.manipulated == node] for node in graph.nodes}
+    sorter = TopologicalSorter(below)
+    sorter.prepare()
+    places: dict[Node, Place] = {}
+    row = 0
+    while sorter.is_active():
+        ready = sorter.get_ready()
+        nodes = sorted(ready, key=lambda n: (fmean([places[m][0] for m in below[n]] or [0.0]), graph.nodes.index(n)))
+        places |= {node: (k - (len(nodes) - 1) / 2, float(row)) for k, node in enumerate(nodes)}
+        sorter.done(*ready)
+        row += 1
+    return places
+
+
+@default_looks({"svg.hashsalt": "apo-bench"})
+def draw_graph(
+    graph: Graph,
+    path: Path,
+    title: str,
+    *,
+    colors: Mapping[str, tuple[float, float, float]],
+    residuals: ArcResiduals = (),
+    gap_m: float = 0.0,
+) -> None:
+    """Write the picture as the suffix of `path` says.
+
+    Args:
+        colors: Part -> RGB in 0..1.
+        residuals: Of each arc, [m], written on it, in red if above `gap_m`; None where it is not known.
+    """
+    from matplotlib.figure import Figure
+
+    places = {node: (x * _COLUMN_IN, y * _ROW_IN) for node, (x, y) in place_nodes(graph).items()}
+    width = 2 * max(abs(x) for x, _ in places.values()) + _COLUMN_IN + 0.5
+    height = max(y for _, y in places.values()) + _BOX_IN[1] + 0.9
+    figure = Figure(figsize=(max(width, 0.08 * len(title)), height), facecolor="white")
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(-figure.get_figwidth() / 2, figure.get_figwidth() / 2), ylim=(-0.7, height - 0.7))
+    axes.axis("off")
+    figure.text(0.5, 0.99, title, ha="center", va="top", fontsize=10, color=_INK)
+    legend = "dashed: disappeared; dash-dot: about an axis" + f"; red: above {gap_m * 1e3:g} mm" * any(residuals)
+    figure.text(0.5, 0.01, legend, ha="center", va="bottom", fontsize=7.5, color=_GONE)
+    for arc, residual in zip(graph.arcs, residuals or [None] * len(graph.arcs), strict=True):
+        color = _INK if arc.lost is None else _GONE
+        if residual is not None and residual > gap_m:
+            color = _ALARM
+        style = _DASHES if arc.lost is not None else _DASH_DOTS if arc.axial else "-"
+        label = arc.name if residual is None else f"{arc.name}\n{residual * 1e3:.2f} mm"
+        _draw_arrow(axes, places[arc.manipulated], places[arc.environment], color, style, label)
+    for node in graph.nodes:
+        face = [_PALE + (1 - _PALE) * c for c in colors[node.part]] if node.part in colors else _GROUND
+        _draw_node(axes, node, places[node], face, graph.stands(node))
+    save_figure(figure, path, dpi=110)
+
+
+def _draw_arrow(axes: Any, upper: Place, lower: Place, color: str, style: Any, label: str) -> None:
+    """An arrow from the bottom of one box to the top of another, with a label."""
+    (x, y), (u, v) = upper, lower
+    y, v = y - _BOX_IN[1] / 2, v + _BOX_IN[1] / 2
+    bend = _BEND if y - v > _ROW_IN else 0.0
+    look = {"arrowstyle": "-|>", "color": color, "linestyle": style, "connectionstyle": f"arc3,rad={bend}"}
+    axes.annotate("", (u, v), (x, y), arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=1)
+    # the arc is a parabola: at a share s of its way it is 2 s (1 - s) rad of its length beside the straight line
+    s = _LABEL_AT
+    aside = 2 * s * (1 - s) * bend
+    at = (x + s * (u - x) - aside * (y - v), y + s * (v - y) - aside * (u - x))
+    white = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"}
+    axes.text(*at, label, fontsize=8, color=color, ha="center", va="center", bbox=white, zorder=2)
+
+
+def _draw_node(axes: Any, node: Node, at: Place, face: Any, stands: bool) -> None:
+    """A box with name and ODL; dashed and white where the part has left."""
+    terms = (f"T_{{{k + 1}}}{'^{-1}' if inverse else ''}" for k, inverse in node.odl)
+    odl = "$" + (r"\,".join(terms) or "T_0") + "$"
+    ink, line = (_INK, "-") if stands else (_GONE, _DASHES)
+    box = {"boxstyle": "round,pad=0.4", "facecolor": face if stands else "white", "edgecolor": ink, "linestyle": line}
+    words = f"{node.part}\n{odl}"
+    axes.text(*at, words, ha="center", va="center", color=ink, fontsize=9.5, bbox=box, parse_math=True, zorder=4)

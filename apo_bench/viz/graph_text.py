@@ -1,0 +1,66 @@
+"""A relation graph as lines, as one JSON object, and as Mermaid text."""
+
+from typing import Any
+
+from apo_bench.assembly import ArcResiduals, Graph, Node, spell
+from apo_bench.io import columns
+
+_SCHEMA = "apo-bench/graph/1"
+
+
+def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str]:
+    """Each part at its placements with the ODL, then each arc: when it was made and lost, faces, residual.
+
+    Args:
+        residuals: Of each arc, [m]; None where it is not known.
+        gap_m: Largest residual of a contact that holds.
+    """
+    nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
+    arcs = []
+    for arc, residual in zip(graph.arcs, residuals, strict=True):
+        lost = "" if arc.lost is None else f", lost at {arc.lost + 1}"
+        above = f", above {gap_m * 1e3:g}" if residual is not None and residual > gap_m else ""
+        size = "" if residual is None else f"{residual * 1e3:.3f} mm{above}"
+        arcs.append((str(arc), f"made {arc.made + 1}{lost}", f"[{' '.join(arc.pairs)}]", size))
+    return [*columns(nodes), "", *columns(arcs)]
+
+
+def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str, Any]:
+    """The JSON object: operations from 1, residuals in mm (null where unknown)."""
+    return {
+        "schema": _SCHEMA,
+        "scenario": scenario,
+        "step": graph.step,
+        "nodes": [_node_form(node) | {"stands": graph.stands(node)} for node in graph.nodes],
+        "arcs": [
+            {
+                "name": arc.name,
+                "manipulated": _node_form(arc.manipulated),
+                "environment": _node_form(arc.environment),
+                "made": arc.made + 1,
+                "lost": None if arc.lost is None else arc.lost + 1,
+                "faces": [[contact.manipulated.face, contact.environment.face] for contact in arc.contacts],
+                "residual_mm": None if residual is None else residual * 1e3,
+            }
+            for arc, residual in zip(graph.arcs, residuals, strict=True)
+        ],
+    }
+
+
+def mermaid_text(graph: Graph) -> str:
+    """A flow chart that GitHub and other readers of Markdown draw; contacts that disappeared are dotted."""
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    lines = ["flowchart TD"]
+    lines += [f'  n{i}["{node.part}<br>{_odl(node)}"]' for node, i in number.items()]
+    for arc in graph.arcs:
+        arrow = "-->" if arc.lost is None else "-.->"
+        lines.append(f"  n{number[arc.manipulated]} {arrow}|{arc.name}| n{number[arc.environment]}")
+    return "\n".join(lines) + "\n"
+
+
+def _node_form(node: Node) -> dict[str, Any]:
+    return {"part": node.part, "placed": None if node.placed is None else node.placed + 1, "odl": _odl(node)}
+
+
+def _odl(node: Node) -> str:
+    return "T0" if node.placed is None else spell(node.odl)

@@ -1,0 +1,127 @@
+"""The sheet of a noise model: what it states about itself, and a table of the errors that it makes."""
+
+import inspect
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Demonstration, placements
+from apo_bench.geometry import Array, pose
+from apo_bench.names import resolve
+from apo_bench.perception.observation.models import Camera, Facts
+from apo_bench.perception.observation.noise import FAILURES, NOISES, NoiseLevel, make_noise
+from apo_bench.perception.observation.noise_file import noise_path, presets, read_noise
+from apo_bench.perception.observation.observing import observe
+from apo_bench.scenario.file import load_scenario
+
+SCENARIO = "stick_in_tower"
+_DRAWS = 1000
+"""Observations of that scenario, three operations each, in a table."""
+_ERRORS = ("across the ray [mm]", "along the ray [mm]", "tilt [deg]", "about the ray [deg]")
+_PERCENTILES = (50, 90, 99)
+
+
+class ErrorSample(NamedTuple):
+    """Errors that a model made."""
+
+    errors: Array
+    """(m, 4), in the frame of the default camera's ray: across and along in mm, tilt and about the ray in degrees."""
+    stated: Array
+    """(4,), root mean square of the standard deviations that the observations stated, in the same units."""
+    missed: float
+    """Share of operations that were not observed."""
+
+
+def list_models() -> Mapping[str, str]:
+    """Name -> title of every model that has a name."""
+    measured = {name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()}
+    return {name: find_facts(name).title for name in NOISES} | measured
+
+
+def find_facts(model: Any) -> Facts:
+    """What a model states about itself; of one that states nothing, its docstring."""
+    model = _resolve_model(model)
+    own = getattr(model, "FACTS", None)
+    title = (inspect.getdoc(model) or "A noise model without a description.").split("\n\n")[0]
+    return own if isinstance(own, Facts) else Facts(" ".join(title.split()), (), "", (), "")
+
+
+def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> ErrorSample:
+    """Errors of many observations of the nominal example 5.1; operations that were not observed have none."""
+    noise = make_noise(model, noise_level)
+    demonstration = nominal_demonstration()
+    camera = Camera()
+    rng = np.random.default_rng(0)
+    errors = []
+    variances = []
+    for _ in range(draws):
+        observation = observe(demonstration, noise, rng)
+        # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
+        Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.poses), 1, 2) @ observation.poses[:, :3, :3])
+        xi = (Q @ pose.log(pose.inverse(demonstration.poses) @ observation.poses)[..., None])[..., 0]
+        covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
+        errors.append(xi[observation.observed])
+        variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.observed])
+    # x is across the ray and z along it; rx tilts it and rz turns about it
+    scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
+    four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
+    stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
+    missed = 1.0 - len(four) / (draws * len(demonstration.poses))
+    return ErrorSample(four, np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale, missed)
+
+
+def nominal_demonstration() -> Demonstration:
+    """The demonstration of an ideal human: the nominal poses of example 5.1, in the middle of their place."""
+    scenario = load_scenario(SCENARIO)
+    poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.goals
+    final = placements(scenario.assembly, scenario.start, poses)[-1]
+    return Demonstration(scenario.assembly, scenario.start, poses, final, np.zeros((len(poses), 6, 6)))
+
+
+def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample, heading: int = 1) -> str:
+    """The sheet of a model in Markdown, with a table of errors that it made."""
+    facts = describe_model(model, heading)
+    if not len(sample.errors):
+        return f"{facts}\nNo operation of {SCENARIO} was observed.\n"
+    missed = f"; {100 * sample.missed:.1f} % were not observed" if sample.missed else ""
+    count = f"{len(sample.errors)} operations of {SCENARIO}{missed}"
+    return "\n".join([facts, f"Errors {_describe_level(model, noise_level)}, {count}:", "", *_tabulate(sample), ""])
+
+
+def describe_model(model: Any, heading: int = 1) -> str:
+    """What a model states about itself, in Markdown."""
+    facts = find_facts(model)
+    name = model if isinstance(model, str) else getattr(model, "__name__", type(model).__name__)
+    lines = [f"Frame: {facts.frame}"] * bool(facts.frame)
+    lines += [f"Parameter {parameter}" for parameter in facts.parameters]
+    lines += [f"States: {facts.states}"] * bool(facts.states)
+    lines += facts.notes
+    formula = "\n".join(f"    {line}" for line in facts.formula)
+    bullets = "\n".join(f"- {line}." for line in lines)
+    return "\n\n".join(filter(None, (f"{'#' * heading} {name}: {facts.title}", formula, bullets))) + "\n"
+
+
+def _describe_level(model: Any, noise_level: NoiseLevel) -> str:
+    if find_facts(model).measured:
+        return f"at {noise_level.mm:g} times the measured mm and {noise_level.deg:g} times the measured degrees"
+    named = isinstance(model, str) and model.partition(":")[0] in NOISES
+    if named or isinstance(_resolve_model(model), type):
+        return f"at {noise_level.mm:g} mm and {noise_level.deg:g} deg"
+    return "at every noise level"
+
+
+def _tabulate(sample: ErrorSample) -> Iterator[str]:
+    """Deviation found, deviation stated, and percentiles of the size, of each error: a table in Markdown."""
+    found = np.sqrt(np.mean(sample.errors**2, axis=0))
+    sizes = np.percentile(np.abs(sample.errors), _PERCENTILES, axis=0)
+    yield f"| {'error':20} |" + "".join(f" {head:>9} |" for head in ("deviation", "stated", "p50", "p90", "p99"))
+    yield "|---" * (len(_PERCENTILES) + 3) + "|"
+    for name, *numbers in zip(_ERRORS, found, sample.stated, *sizes, strict=True):
+        yield f"| {name:20} |" + "".join(f" {f'{number:.3g}':>9} |" for number in numbers)
+
+
+def _resolve_model(model: Any) -> Any:
+    """What a name stands for: a class, or an object that no noise level changes; a measured one at level 1."""
+    known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
+    return make_noise(model, NoiseLevel(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")

@@ -1,0 +1,90 @@
+"""The parts where observed or corrected poses put them after a step, as text and as a picture (Fig. 9, 13 and 16)."""
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Observation, Poses, arc_residuals, placements, relation_graph
+from apo_bench.geometry import Array
+from apo_bench.io import default_looks, save_figure
+from apo_bench.judging.contacts import face_overlap
+from apo_bench.scenario import Scenario
+from apo_bench.simulation.film.framing import frame_parts
+from apo_bench.simulation.scene import build_scene, camera_view, picture
+from apo_bench.viz.panels import Panel, PanelLine, draw_panels
+
+_SIZE = (620, 480)
+_AZIMUTH_DEG = 28.0
+_ELEVATION_DEG = -20.0
+_MOST_LINES = 6
+_LETTERS = 86
+
+
+class PosesPanel(NamedTuple):
+    """Where poses put the parts, and which contacts they do not make."""
+
+    title: str
+    poses: Poses
+    gap_m: float
+    """The largest |e| of all contacts."""
+    open: tuple[str, ...]
+    """`R4 stick -> castle2: 1.31 mm`, the worst first; then `R1 castle1 -> table: no overlap`."""
+    warning: str = ""
+    """What the consistency test and the failure prediction say."""
+
+
+def poses_panel(title: str, observation: Observation, poses: Array, step: int, warning: str = "") -> PosesPanel:
+    """The assembly at poses (n, 4, 4), world frame, [m], after so many operations."""
+    assembly = observation.assembly
+    graph = relation_graph(assembly, step)
+    residuals = arc_residuals(assembly, observation.start, poses, graph)
+    placed = placements(assembly.first(step), observation.start, poses[:step])[-1]
+    wrong = []
+    for e, arc in sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0]):
+        if e > observation.gap_m:
+            wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
+    for arc in graph.arcs:
+        if arc.lost is None and any(face_overlap(assembly, contact, placed).area <= 0.0 for contact in arc.contacts):
+            wrong.append(f"{arc}: no overlap")
+    return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)
+
+
+def poses_lines(panels: Sequence[PosesPanel]) -> list[str]:
+    """A sentence for each: `observed: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
+    lines = []
+    for panel in panels:
+        holds = f"open: {', '.join(panel.open)}" if panel.open else "all contacts hold"
+        parts = (f"{panel.title}: largest gap {1e3 * panel.gap_m:.3f} mm", holds, panel.warning)
+        lines.append("; ".join(filter(None, parts)))
+    return lines
+
+
+@default_looks()
+def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out: str | Path) -> None:
+    """Write the panels side by side, from one point of view, as PNG.
+
+    Raises:
+        InputError: Nothing here can draw, or the file cannot be written.
+    """
+    scene = build_scene(scenario)
+    assembly = scenario.assembly
+    # the camera looks obliquely at the parts of the last operation
+    last = assembly.operations[step - 1]
+    near = {*last.moves, *(contact.environment.part for contact in last.contacts)} - set(assembly.fixed)
+    first = panels[0].poses[assembly.operations[0].main]
+    azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
+    camera = camera_view(*frame_parts(assembly, [panels[0].poses], near), azimuth, _ELEVATION_DEG)
+    drawn = [Panel(picture(scene, p.poses, *_SIZE, camera), _lines_below(p), p.title) for p in panels]
+    save_figure(draw_panels(f"{scenario.name} after operation {step}", drawn), out)
+
+
+def _lines_below(panel: PosesPanel) -> list[PanelLine]:
+    lines = [f"all contacts hold: largest gap {1e3 * panel.gap_m:.3f} mm"]
+    if panel.open:
+        lines = [f"contacts that do not hold: {panel.open[0]}", *panel.open[1 : _MOST_LINES - 1]]
+    if len(panel.open) > len(lines):
+        lines.append(f"and {len(panel.open) - len(lines)} more")
+    return [PanelLine(text) for text in (*lines, *textwrap.wrap(panel.warning, _LETTERS))]

@@ -1,0 +1,169 @@
+"""The probing motions of a plan for a real robot: contacts, squaring grips, laying flat, the spiral search.
+
+All places and numbers are those of the simulation. Planes are in the frame of the base; a point that makes contact, and
+the pose of a part in the hand, are in the frame of the tip, also where poses are of the flange.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly import Plan
+from apo_bench.formats.json_forms import TO_MM_DEG
+from apo_bench.formats.robot_frames import RobotFrames
+from apo_bench.geometry import Array, pose
+from apo_bench.records import FtNoise, ft_noise
+from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search, search_laws
+from apo_bench.simulation.execution.probing import lay_flat, touching
+from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
+from apo_bench.simulation.execution.probing.places import (
+    OPENING_M,
+    TouchPlace,
+    floor_places,
+    opposite_places,
+    wall_places,
+)
+from apo_bench.simulation.execution.probing.state import FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
+from apo_bench.simulation.robot import filtered_noise, low_pass_part
+from apo_bench.simulation.scene import Scene
+from apo_bench.viz.robot_form import pose_form, tip_form
+
+
+def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
+    """The JSON object: mm, N, Nm, s, degrees and unit vectors.
+
+    Args:
+        sensor: Force-torque sensor of the wrist, as in `ft_noise`.
+
+    Raises:
+        InputError: An unknown sensor.
+    """
+    noise = ft_noise(sensor)
+    felt = filtered_noise(noise, low_pass_part())
+    guard = touch_guard(felt.force_n)
+    touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
+    return {
+        "sensor": {"name": sensor, "noise_n": noise.force_n, "noise_nm": noise.torque_nm},
+        "touch": {
+            "each_finger_open_mm": _mm(OPENING_M),
+            "guard_n": round(guard, 6),
+            "speed_mm_s": _mm(touching.SPEED),
+            "expected_after_mm": _mm(STAND_OFF_M),
+            "at_most_mm": _mm(2.0 * STAND_OFF_M + touching.BEYOND_M),
+            "sigma_mm": _mm(TOUCH_SIGMA_M),
+            **{name: [_touch(place, frames) for place in places(plan, scene)] for name, places in touches.items()},
+        },
+        "lay_flat": {
+            "press_n": lay_flat.PRESS_N,
+            "from_above_mm": _mm(lay_flat.NEAR_M),
+            "yield_mm_s_per_n": _mm(lay_flat.YIELD_M),
+            "fastest_mm_s": _mm(lay_flat.FASTEST),
+            "fastest_deg_s": _deg(lay_flat.FASTEST_RAD),
+            "lies_when": {
+                "press_within_n": round(lay_flat.CALM * lay_flat.PRESS_N, 6),
+                "turns_slower_than_deg_s": _deg(lay_flat.CALM_RAD),
+                "for_s": lay_flat.CALM_S,
+            },
+            "gives_up": {"after_s": lay_flat.MOST_S, "below_begin_mm": _mm(lay_flat.DEEPEST_M)},
+            "sigma_mm": _mm(FOOT_SIGMA_M),
+        },
+        "search": {
+            "radius_mm": _mm(search.RADIUS_M),
+            "pitch_mm": _mm(search_laws.PITCH_M),
+            "then_turned_deg": list(search.YAWS_DEG),
+            "radius_turned_mm": _mm(search.YAWED_RADIUS_M),
+            "at_most_times": search.SEARCHES,
+        },
+        "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
+        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, PROBING_ACTIONS)],
+    }
+
+
+def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
+    return {
+        "from": tip_form(place.T_world_tip, frames),
+        "direction": _turned(place.way, frames),
+        "point_in_tip_mm": _mms(place.patch.mean(axis=0)),
+        "corners_in_tip_mm": [_mms(corner) for corner in place.patch],
+        **_plane(place.normal, place.offset, frames),
+    }
+
+
+def _step(move: Move, scene: Scene, frames: RobotFrames, felt: FtNoise) -> dict[str, Any]:
+    t = move.transfer
+    first = t.grips[0]
+    return {
+        "operation": move.step.operation + 1,
+        "undo": move.step.undo,
+        "part": t.part,
+        "square": [_grip(grip, t.T_world_start, scene, frames) for grip in t.squaring],
+        "grasp_twice": _grip(first, t.T_world_start, scene, frames),
+        "lay_flat": None if t.flat is None else _laid(t, frames, felt),
+        "guards_n": {"down": round(t.place_n, 6), "insert": round(t.insert_n, 6), "slide": round(t.slide_n, 6)},
+        "search_press_n": None if t.front is None else round(t.slide_n, 6),
+    }
+
+
+def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, Any]:
+    """Fingers that close on a part at T, (4, 4), world."""
+    return {
+        "at": tip_form(T @ grip.T_part_tip, frames),
+        "each_finger_open_mm": _mm(min(grip.half_width + OPEN_TO_PICK_M, scene.arm.opening_m)),
+        "closed_on_part_mm": _mm(grip.half_width),
+    }
+
+
+def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | None:
+    """None where the sensor could not tell lying."""
+    averaged = lay_flat.averaged_s(t.flat, felt)
+    if averaged > lay_flat.LONGEST_S:
+        return None
+    grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
+    foot = pose.apply(t.flat.T, t.flat.feet[:1])[0]
+    return {
+        "when": "before the last motion" if t.into.level else "before it is carried",
+        "at": tip_form(t.flat.T @ grip.T_part_tip, frames),
+        "part_in_tip": pose_form(pose.inverse(grip.T_part_tip), frames),
+        "feet_in_part_mm": [_mms(foot) for foot in t.flat.feet],
+        **_plane(t.flat.normal, float(t.flat.normal @ foot), frames),
+        "yield_deg_s_per_nm": _deg(lay_flat.turn_yield(t.flat)),
+        "averaged_over_s": round(averaged, 6),
+        "then_walls": [
+            {
+                "from": tip_form(place.T @ grip.T_part_tip, frames),
+                "direction": _turned(place.way, frames),
+                "point_in_part_mm": _mms(place.point),
+                **_plane(place.normal, float(place.normal @ place.edge), frames),
+            }
+            for place in t.side_touches
+        ],
+    }
+
+
+def _plane(normal: Array, offset: float, frames: RobotFrames) -> dict[str, Any]:
+    """normal . x = offset, in the base."""
+    return {
+        "normal": _turned(normal, frames),
+        "offset_mm": _mm(offset - float(normal @ frames.T_world_base[:3, 3])),
+    }
+
+
+def _turned(way: Array, frames: RobotFrames) -> list[float]:
+    return _rounded(frames.T_world_base[:3, :3].T @ way, 12)
+
+
+def _mms(point: Array) -> list[float]:
+    return _rounded(1e3 * point, 9)
+
+
+def _rounded(values: Array | Sequence[float], digits: int) -> list[float]:
+    return (np.round(values, digits) + 0.0).tolist()
+
+
+def _mm(metres: float) -> float:
+    return round(1e3 * metres, 9)
+
+
+def _deg(radians: float) -> float:
+    return round(float(np.degrees(radians)), 9)

@@ -1,0 +1,132 @@
+"""The task sheet of a scenario, in Markdown: everything in it is read from the scenario."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from apo_bench.assembly import Layout, joint_play_mm, placements, relation_graph
+from apo_bench.geometry import Array
+from apo_bench.io import listed_words
+from apo_bench.judging.finished import fixtures
+from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
+
+
+def task_sheet(scenario: Scenario, level: int = 1) -> str:
+    """The sheet of a scenario under a heading of that level."""
+    mark = "#" * level
+    parts = [
+        f"{name}{'' if path.stem == name else f' ({path.stem})'}{', fixed' if name in scenario.assembly.fixed else ''}"
+        for name, path in scenario.part_files.items()
+    ]
+    sections = {
+        f"{mark} {scenario.name}: {scenario.title}": f"In the paper: {scenario.paper}." if scenario.paper else "",
+        f"{mark}# Parts": _bullets(parts),
+        f"{mark}# Operations": "\n".join(_describe_operations(scenario)),
+        f"{mark}# Human": _bullets(filter(None, (scenario.human, _describe_human_error(scenario)))),
+        f"{mark}# Variations": _bullets(_describe_variations(scenario)),
+        f"{mark}# Success": _bullets(_describe_success(scenario)),
+    }
+    return "\n\n".join(filter(None, (text for section in sections.items() for text in section))) + "\n"
+
+
+def _bullets(lines: Iterable[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def _describe_operations(scenario: Scenario) -> Iterator[str]:
+    """`5. stick: R6 stick -> cube2 (py-hpy, ...), R7 ...; ends R2`."""
+    graph = relation_graph(scenario.assembly)
+    for k, operation in enumerate(scenario.assembly.operations):
+        made = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in graph.arcs if arc.made == k)
+        ended = ", ".join(arc.name for arc in graph.arcs if arc.lost == k)
+        carried = f" with {listed_words(operation.carries)}" if operation.carries else ""
+        yield f"{k + 1}. {operation.main}{carried}: {made or 'no contact'}{ended and f'; ends {ended}'}"
+
+
+def _describe_human_error(scenario: Scenario) -> str:
+    error = scenario.human_error
+    if error is None:
+        return "The scenario states no human error."
+    # a displaced face leads later operations astray
+    offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), error.axis).offsets
+    mains = [operation.main for operation in scenario.assembly.operations]
+    astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)
+    followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
+    follow = f"; {listed_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
+    return (
+        f"At `human_error_scale` 1, operation {error.operation + 1} displaces {mains[error.operation]} by "
+        f"{_format_span(error.low_m, error.high_m)} mm along {_name_axis(error.axis)}, to either side{follow}; "
+        "the human repairs this at the last operation, after the last observation."
+    )
+
+
+def _describe_variations(scenario: Scenario) -> Iterator[str]:
+    site = scenario.site
+    x, y = (f"{c * 1e3:g} ± {s * 1e3:g}" for c, s in zip(site.center_m, site.spread_m, strict=True))
+    low, high = np.degrees(site.yaw_rad)
+    names = [f"Operation {k}: {operation.main}" for k, operation in enumerate(scenario.assembly.operations, start=1)]
+    yield f"Place of the assembly: x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees."
+    for shift in scenario.shifts:
+        span = _format_span(shift.low_m, shift.high_m)
+        yield f"{names[shift.operation]} by {span} mm along {_name_axis(shift.axis)}."
+    for turn in scenario.turns:
+        degrees = f"{np.degrees(turn.low_rad):g} to {np.degrees(turn.high_rad):g} degrees"
+        yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_through(turn)}."
+
+
+def _describe_success(scenario: Scenario) -> Iterator[str]:
+    t = scenario.thresholds
+    clearance = scenario.clearance_mm
+    if scenario.success:
+        yield scenario.success
+    yield (
+        f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
+        f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
+        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
+        f"another; no parts that touch slid against each other by more than {t.displaced_mm:g} mm; all parts released "
+        f"and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+    )
+    if wider := sorted(_list_wider(scenario)):
+        limits = "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in wider)
+        yield f"Some faces have more play, so they may be farther apart: {limits}."
+    if any(scenario.assembly.is_round(relation.contact) for relation in scenario.assembly.relations()):
+        yield (
+            "Of round faces the axes count, at both ends of their common length, which is their overlap; a hole that "
+            "is wider than its shaft allows that much more. A part of revolution may end at any turn about its axis."
+        )
+    if removed := sorted(fixtures(scenario.assembly)):
+        yield f"{listed_words(removed)} may end anywhere: it is a fixture, used and removed."
+    only = "" if scenario.success_means == "assembled" else " Here only that is a success."
+    yield (
+        "As demonstrated: the same, and every contact also when it was made, where it was demonstrated; no corner of a "
+        f"part in place moved by more than {t.displaced_mm:g} mm.{only}"
+    )
+    yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
+    yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."
+
+
+def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    """Contacts whose play is larger than the clearance, and their play [mm], at the nominal poses."""
+    assembly = scenario.assembly
+    history = placements(assembly, scenario.start, scenario.goals)
+    for contact, operation, _ in assembly.relations():
+        play = joint_play_mm(assembly, contact, operation, history[operation], scenario.clearance_mm)
+        if play is not None and play > scenario.clearance_mm:
+            yield str(contact), play
+
+
+def _format_span(low_m: float, high_m: float) -> str:
+    return f"{low_m * 1e3:g} to {high_m * 1e3:g}"
+
+
+def _through(turn: Turn) -> str:
+    """` through (-30, 0, 0) mm`, unless that is the origin of the part."""
+    return f" through ({', '.join(f'{1e3 * x:g}' for x in turn.point)}) mm" if turn.point.any() else ""
+
+
+def _name_axis(axis: Array) -> str:
+    """`its x axis`, of the part at its nominal pose."""
+    i = int(np.argmax(np.abs(axis)))
+    if abs(axis[i]) > 1 - 1e-9:
+        return f"its {'-' if axis[i] < 0 else ''}{'xyz'[i]} axis"
+    return f"its direction ({', '.join(f'{a:.3g}' for a in axis)})"

@@ -1,0 +1,77 @@
+"""A finished trial of a sweep, run again."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from apo_bench.errors import InputError
+from apo_bench.io import each_line
+from apo_bench.records import TrialConfig, TrialRecord, read_secret_seed, settings_of
+from apo_bench.records.own_code import own_code
+from apo_bench.records.run.run_file import read_run, scenario_files
+from apo_bench.records.run.validation import record_of
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.request import Request, run_settings
+from apo_bench.trial.rollout import Rollout
+
+
+def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None = None) -> tuple[TrialRecord, Rollout]:
+    """Run a trial of a sweep again.
+
+    Args:
+        folder: Of the sweep.
+        number: Line of the trial in `trials.jsonl`, from 1; None: the first failure, or the first trial.
+        secret_seed_file: Of a sweep with a secret seed.
+
+    Raises:
+        InputError: There is no such trial.
+        RuntimeError: It would not be the same trial, or the robot did not replay anything.
+    """
+    number, record = _choose_trial(folder, number)
+    if code := own_code(record):
+        raise RuntimeError(
+            f"trial {number} names code that does not come with the package ({', '.join(code)}), and no file makes it "
+            "run; run the trial yourself with `apo-bench run .. --view`."
+        )
+    name = record["scenario"]
+    config = settings_of(record, scenario_files(read_run(folder)).get(name, name))
+    if secret_seed_file is not None:
+        config = replace(config, secret_seed=read_secret_seed(secret_seed_file))
+    if reason := why_different(record, config):
+        raise RuntimeError(f"trial {number} of {folder} cannot run again: {reason}.")
+    again, rollout = run_again(config)
+    if rollout is None:
+        raise RuntimeError(f"the robot did not replay anything in trial {number}: {again['sentence']}.")
+    return again, rollout
+
+
+def why_different(record: TrialRecord, config: TrialConfig) -> str:
+    """Why these settings would not give the trial of a record again; empty if they would."""
+    content = content_hash(load_scenario(config.scenario), config.scenario, find_arm(config.arm).files)
+    if config_hash(config, content) == record.get("config_hash"):
+        return ""
+    secret = record.get("secret_seed") is not None and config.secret_seed is None
+    return "its secret seed is missing (--secret-seed-file)" if secret else "another version or other files made it"
+
+
+def run_again(config: TrialConfig) -> tuple[TrialRecord, Rollout | None]:
+    """The record and the rollout of a trial; None if the robot did not replay anything."""
+    rollouts = list[Rollout]()
+    record = run_settings(Request(config.scenario), config, rollouts.append)
+    return record, rollouts[0] if rollouts else None
+
+
+def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
+    path = folder / "trials.jsonl"
+    first = None
+    count = 0
+    for count, line in each_line(path, "table of trials"):
+        if number in (None, count):
+            record = record_of(line, f"{path}, line {count}")
+            if number is not None or (record["success"] is False and record["sim_time_s"] is not None):
+                return count, record
+            first = first or (count, record)
+    if first is None:
+        raise InputError(f"{path}: --trial must be a number from 1 to {count}, got {number}.")
+    return first

@@ -1,0 +1,103 @@
+"""Parts that were drawn line to line, or a little too thick, get play that the scenario states; deeper ones do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench import InputError
+from apo_bench.geometry import Solid, intrusion, physical_pieces
+from apo_bench.importers.assembly.added_clearance import add_clearance
+from apo_bench.importers.assembly.posed import PosedPart
+from apo_bench.importers.assembly.upright import new_upright_scenario
+from apo_bench.importers.assembly.writing import scenario_text, write_scenario
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.parts import load_part
+from apo_bench.scenario.parts.fit import with_fit
+from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft, write_part
+from tests.importers.assembly.test_blocked import FLOOR, made
+
+SLOTTED = join(FLOOR, *(extrude(rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
+
+
+def slotted(folder: Path, thick: float) -> tuple[PosedPart, ...]:
+    """A tongue on the floor of a slot that is 20 mm wide."""
+    tongue = extrude(rectangle(thick, 30), 0, 35, bottom="foot", top="head")
+    return made(folder, base=(SLOTTED, (0, 0, 0)), tongue=(tongue, (0, 0, 10)))
+
+
+def width(solid: Solid, clearance_mm: float = 0.0) -> float:
+    pieces = physical_pieces(solid, 1e-3 * clearance_mm)
+    return 1e3 * float(np.ptp(np.concatenate([piece.corners for piece in pieces])[:, 0]))
+
+
+@pytest.mark.parametrize("over", [0.0, 0.02, 0.1])
+def test_a_tongue_as_wide_as_its_slot_or_wider_gets_play_that_the_file_states(tmp_path: Path, over: float) -> None:
+    parts = slotted(tmp_path, 20.0 + 2.0 * over)
+    (_, tongue), (note,) = add_clearance(parts, 0.25)
+    assert sorted(tongue.fit.values()) == pytest.approx([over, over], abs=1e-5)
+    assert width(tongue.solid) == pytest.approx(20.0, abs=1e-4)
+    assert width(tongue.solid, 0.25) == pytest.approx(19.5, abs=1e-4)
+    assert "as stated under [parts.tongue.fit]" in note
+    path = tmp_path / "own.toml"
+    found = new_upright_scenario(parts)
+    write_scenario(found, path, "own", "a test")
+    assert note in found.notes
+    assert f"# NOTE: {note}." in path.read_text(encoding="utf-8")
+    read = load_scenario(path).assembly.solids["tongue"]
+    assert width(read, 0.25) == pytest.approx(19.5, abs=1e-4)
+    assert len(load_scenario(path).assembly.operations[0].contacts) == 3
+
+
+@pytest.mark.parametrize(
+    ("over", "clearance", "most"), [(0.3, 0.25, 0.2), (0.1, 0.25, 0.05), (0.0, 0.25, 0.0), (0, 0, 1)]
+)
+def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
+    tmp_path: Path, over: float, clearance: float, most: float
+) -> None:
+    parts = slotted(tmp_path, 20.0 + 2.0 * over)
+    assert add_clearance(parts, clearance, most) == (parts, ())
+
+
+def test_what_has_play_keeps_its_size(tmp_path: Path) -> None:
+    parts = slotted(tmp_path, 19.8)
+    assert add_clearance(parts, 0.25) == (parts, ())
+
+
+@pytest.mark.parametrize("over", [0.0, 0.05])
+def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
+    plate = extrude(rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
+    parts = made(tmp_path, plate=(plate, (0, 0, 0)), pin=(shaft(4.0 + over, 0, 30, "pin"), (0, 0, 0)))
+    (_, pin), _ = add_clearance(parts, 0.25)
+    assert pin.fit == {"pin": pytest.approx(over, abs=1e-5)}
+    assert pin.solid.rounds["pin"].radius == pytest.approx(4e-3, abs=1e-8)
+    assert intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
+
+
+def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
+    write_part("leaf", extrude(rectangle(0.4, 30), 0, 35), tmp_path, density=700, source="a test", licence="CC0-1.0")
+    solid = load_part(tmp_path / "leaf.xml")
+    sides = {name: 0.25 for name, face in solid.faces.items() if abs(face.normal[0]) > 0.9}
+    with pytest.raises(InputError, match="leaves less than"):
+        with_fit(solid, sides)
+
+
+@pytest.mark.parametrize(
+    ("fit", "said"),
+    [
+        ("nope = 0", "unknown face 'nope'"),
+        ("head = -1.1", "fit: a number >= -1.0 is needed"),
+        ("head = 'x'", "number"),
+        ("head = 2", "fit: a number <= 1.0 is needed"),
+    ],
+)
+def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
+    parts = slotted(tmp_path, 20.0)
+    path = tmp_path / "own.toml"
+    text = scenario_text(new_upright_scenario(parts), "own", "a test", path)
+    head, tail = text.split("\n[parts.tongue.fit]")
+    path.write_text(head + "\n[parts.tongue.fit]\n" + fit + "\n\n" + tail.split("\n\n", 1)[1], encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        load_scenario(path)

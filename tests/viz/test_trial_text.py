@@ -1,0 +1,74 @@
+"""A person reads six lines of a trial, and no line hides the number that decides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.assembly import Outcome
+from apo_bench.benchmark.analysis import tally
+from apo_bench.cli.rates import print_rates
+from apo_bench.trial.endings import end_record
+from apo_bench.viz.trial_text import summary_lines, trial_lines
+from tests.benchmark.analysis.test_rates import row
+
+
+def record(success: bool, code: str = "gap", **more: Any) -> Any:
+    end = end_record(Outcome("judge", code, None, "a gap is left"), success=success)
+    return {**row("contact", 0, success, pose_source="noise-model"), **end, **more}
+
+
+@pytest.mark.parametrize(
+    ("code", "numbers", "line"),
+    [
+        ("gap", {"worst_gap_mm": 7.0}, ("worst gap", "7.000 mm between faces that should touch")),
+        ("overlap", {"least_overlap": 0.25, "worst_gap_mm": 0.1}, ("least overlap", "25% of the true overlap")),
+        ("force_stop", {"peak_force_n": 21.04}, ("peak force", "21.0 N")),
+        ("penetration", {"penetration_mm": None, "peak_force_n": 2.0}, ("peak force", "2.0 N")),
+    ],
+)
+def test_the_fourth_line_is_the_number_that_decides(code: str, numbers: dict[str, Any], line: tuple[str, str]) -> None:
+    lines = summary_lines(record(False, code, **({"worst_gap_mm": None} | numbers)), "stick_in_tower")
+    assert len(lines) == 6
+    assert lines[3] == line
+
+
+def test_the_last_line_shows_the_trial_again() -> None:
+    file = "own/tower.toml"
+    assert summary_lines(record(True), file)[5][1].startswith(f"apo-bench run {file} ")
+    measured = summary_lines(record(True, noise_mm=None, noise_deg=None), file, Path("seen.csv"))
+    assert measured[5][1] == f"apo-bench run {file} --observation seen.csv --method contact --view"
+    assert "measured observation" in measured[0][1]
+
+
+@pytest.mark.parametrize(
+    ("p", "passes", "words"),
+    [
+        (0.84, True, "chi-square 8.0 of 13, p 0.84: explained by the stated noise"),
+        (0.0, False, "p < 1e-300: not explained by the stated noise; one of R2, R4 may be wrong"),
+    ],
+)
+def test_a_test_says_whether_it_passes(p: float, passes: bool, words: str) -> None:
+    suspects = [] if passes else ["R2", "R4"]
+    more = {"chi_square": 8.0, "chi_square_dof": 13, "p_value": p, "test_passes": passes, "suspects": suspects}
+    assert dict(trial_lines(record(True, **more)))["consistency test"].endswith(words)
+
+
+def test_a_robot_that_probes_names_its_sensor_and_its_own_error() -> None:
+    numbers = {"probe_contacts": 9, "probe_contacts_rejected": 1}
+    numbers |= {"base_error_estimate_mm": 0.62, "base_error_estimate_deg": 0.08}
+    numbers |= {"base_error_std_mm": 0.05, "base_error_std_deg": 0.01, "ft_sensor": "joint-torque"}
+    probing = record(True, method="contact+probe", assumed_robot_error="matched", **numbers)
+    assert dict(trial_lines(probing))["probing"] == (
+        "base error 0.62 mm and 0.08 degrees (standard deviations 0.05 and 0.01) from 9 contacts; 1 more were rejected"
+    )
+    trial = summary_lines(probing, "stick_in_tower")[0][1]
+    assert trial.endswith(", ft sensor joint-torque")
+    assert "ft sensor" not in summary_lines(record(True, ft_sensor="joint-torque"), "stick_in_tower")[0][1]
+
+
+def test_demonstrations_that_failed_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    print_rates(tally([row("contact", 9), *(row("contact", i, None) for i in range(2))]))
+    assert "the demonstration itself failed: 2" in capsys.readouterr().out
