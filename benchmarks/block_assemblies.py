@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts.making import Body, extrude, join, polygon, rectangle
@@ -153,6 +153,6 @@ def scenario_of_blocks(seed: int, folder: Path) -> Path:
     """Write the scenario file of the assembly of a seed."""
     poses = write(blocks(seed), folder)
     path = folder / f"blocks_{seed}.toml"
-    made = draft(on_the_table(read_posed(poses)))
+    made = new_scenario(on_the_table(read_posed(poses)))
     write_scenario(made, path, f"Blocks {seed}", poses.name)
     return path

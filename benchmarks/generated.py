@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts.making import (
@@ -236,6 +236,6 @@ def scenario_of(seed: int, folder: Path) -> Path:
     """Write the scenario file of the assembly of a seed."""
     poses = write(generated(seed), folder)
     path = folder / f"generated_{seed}.toml"
-    made = draft(on_the_table(read_posed(poses)))
+    made = new_scenario(on_the_table(read_posed(poses)))
     write_scenario(made, path, f"Generated assembly {seed}", poses.name)
     return path

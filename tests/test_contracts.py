@@ -43,8 +43,8 @@ BREACHES = {
         ("apo_bench.benchmark.report.report", "apo_bench.benchmark.scoring.score"),
     ],
     "importers": [
-        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.draft"),
-        ("apo_bench.importers.assembly.draft", "apo_bench.importers.recording.importing"),
+        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.new_scenario"),
+        ("apo_bench.importers.assembly.new_scenario", "apo_bench.importers.recording.importing"),
     ],
     "simulation": [
         ("apo_bench.simulation.arms.kinematics", "apo_bench.simulation.scene.world"),
@@ -87,7 +87,7 @@ BREACHES = {
     ],
     "importers-used": [
         ("apo_bench.trial.run", "apo_bench.importers.recording.importing"),
-        ("apo_bench.viz.task_sheet", "apo_bench.importers.assembly.draft"),
+        ("apo_bench.viz.task_sheet", "apo_bench.importers.assembly.new_scenario"),
         ("apo_bench.scenario.file", "apo_bench.importers.cad.importing"),
     ],
     "report": [

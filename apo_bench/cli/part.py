@@ -44,7 +44,7 @@ def part_import(
     from apo_bench.importers.cad.importing import raw_solids
     from apo_bench.importers.cad.part_report import file_lines, report_file
     from apo_bench.importers.cad.places import named_places, write_places
-    from apo_bench.importers.cad.solids.naming import renamed
+    from apo_bench.importers.cad.solids.naming import rename_faces
 
     names = _parse_names(name or [])
     source, solids = raw_solids(file, unit, round_sides)
@@ -55,7 +55,7 @@ def part_import(
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("\n".join(file_lines(source, file)), as_json)
-        imported, refused = _import_solids(file, [renamed(raw, names) for raw in solids], out, density, as_json)
+        imported, refused = _import_solids(file, [rename_faces(raw, names) for raw in solids], out, density, as_json)
         places = named_places({part.path.stem: part.raw.places for part in imported})
         poses = write_places(places, out, file.name) if len(places) > 1 else None
     if poses is not None:
@@ -73,13 +73,13 @@ def _import_solids(
     from apo_bench.importers.cad.importing import import_part
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import part_lines, report_part
-    from apo_bench.importers.cad.solids.naming import part_name, title_of
+    from apo_bench.importers.cad.solids.naming import clean_title, part_name
 
     imported: list[Any] = []
     refused: list[str] = []
     used: set[str] = set()
     for raw in solids:
-        stem = part_name(raw.name, used | _find_others(out, title_of(raw.name)))
+        stem = part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
         used.add(stem)
         try:
             part = import_part(raw, stem, out, file.name, density)

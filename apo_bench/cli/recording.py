@@ -51,9 +51,8 @@ def recording_import(
     """
     from apo_bench.importers.recording.camera_file import read_camera
     from apo_bench.importers.recording.formats import read_log
-    from apo_bench.importers.recording.hands import find_hands
     from apo_bench.importers.recording.objects_file import name_tracks, read_objects
-    from apo_bench.importers.recording.show.text import reading_lines
+    from apo_bench.importers.recording.text import reading_lines
 
     inputs = (log, camera, objects)
     check_output(out, "--out", ".json", ".csv", inputs=inputs)
@@ -64,9 +63,8 @@ def recording_import(
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
-    hands = find_hands(read, named)
-    tracks = name_tracks(read, named, hands)
-    print_columns(reading_lines(read, named, hands))
+    tracks = name_tracks(read, named)
+    print_columns(reading_lines(read, named))
     if scenario is None:
         _import_alone(read, stated, tracks, out, picture)
     else:
@@ -81,9 +79,9 @@ def _import_for_scenario(
     from apo_bench import load_scenario
     from apo_bench.formats.json_forms import write_form
     from apo_bench.formats.observation_json import observation_form
+    from apo_bench.importers.recording.drawing import draw_recording
     from apo_bench.importers.recording.importing import import_recording
-    from apo_bench.importers.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
-    from apo_bench.importers.recording.show.text import PATH_HEAD, imported_lines, path_rows
+    from apo_bench.importers.recording.text import PATH_HEAD, imported_lines, path_rows
 
     task = load_scenario(scenario)
     require(
@@ -94,7 +92,7 @@ def _import_for_scenario(
         imported = import_recording(tracks, camera, task, order, log.file, models)
     except InputError:
         if picture is not None:
-            draw_recording(unfit_drawing(log, tracks, camera, task), picture)
+            draw_recording(f"{log.file}, {task.name}; it does not fit", tracks, camera.T_world_camera, [], picture)
             typer.echo(f"Wrote {picture}, as the log was read")
         raise
     mains = [operation.main for operation in task.assembly.operations]
@@ -106,25 +104,22 @@ def _import_for_scenario(
         _write_table(out, mains, rests, imported.observation.poses, camera)
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
-    if picture is not None:
-        draw_recording(drawing_of(imported, log, tracks, camera), picture)
-    _print_rests(imported.camera, mains, rests, tracks)
+    _show_rests(f"{log.file}, {task.name}", imported.arrangement.camera, mains, rests, tracks, picture)
     print_columns(imported_lines(imported))
 
 
 def _import_alone(log: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.importers.recording.show.drawing import draw_recording, unplanned_drawing
-    from apo_bench.importers.recording.show.text import put_lines
-    from apo_bench.importers.recording.unplanned import goals_of, unplanned_recording
+    from apo_bench.importers.recording.unplanned import unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
-    parts = [put.part for put in recording.puts]
-    rests = [put.rest for put in recording.puts]
-    _write_table(out, parts, rests, goals_of(recording), camera)
-    if picture is not None:
-        draw_recording(unplanned_drawing(recording, log, tracks), picture)
-    _print_rests(recording.camera, parts, rests, tracks)
-    typer.echo("\n".join(put_lines(recording)))
+    parts = [placement.part for placement in recording.placements]
+    rests = [placement.rest for placement in recording.placements]
+    poses = [recording.camera.T_world_camera @ rest.T for rest in rests]
+    _write_table(out, parts, rests, poses, camera)
+    _show_rests(log.file, recording.camera, parts, rests, tracks, picture)
+    for k, placement in enumerate(recording.placements, start=1):
+        if placement.carries:
+            typer.echo(f"operation {k}: {placement.part} and {', '.join(placement.carries)} moved together")
 
 
 def _parse_order(ends: str | None, unseen: str | None) -> Any:
@@ -135,20 +130,21 @@ def _parse_order(ends: str | None, unseen: str | None) -> Any:
     return Stated(parse_list(ends, "--ends", float) if ends else (), tuple(k - 1 for k in hidden))
 
 
-def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any) -> None:
-    """Print the camera, and where each part rested after its operation."""
-    from apo_bench.importers.recording.show.text import camera_lines, rest_lines
+def _show_rests(title: str, camera: Any, parts: list[str], rests: list[Any], tracks: Any, picture: Path | None) -> None:
+    """Print and draw the camera, and where each part rested after its operation."""
+    from apo_bench.importers.recording.drawing import draw_recording
+    from apo_bench.importers.recording.text import camera_lines, rest_lines
 
+    pairs = list(zip(parts, rests, strict=True))
     print_columns(camera_lines(camera))
-    times = {part: track.t for part, track in tracks.items()}
-    lines = rest_lines(list(zip(parts, rests, strict=True)), camera.T_world_camera, times)
-    typer.echo("\n" + "\n".join([*lines, ""]))
+    typer.echo("\n" + "\n".join([*rest_lines(pairs, camera.T_world_camera), ""]))
+    if picture is not None:
+        ended = [(part, rest.begins) for part, rest in pairs if rest is not None]
+        draw_recording(title, tracks, camera.T_world_camera, ended, picture)
 
 
 def _write_table(path: Path, parts: list[str], rests: list[Any], poses: Any, camera: Any) -> None:
     """Write poses as CSV; an operation that the log does not show has no rest."""
-    from apo_bench.importers.recording.importing import deviations
-    from apo_bench.importers.recording.show.text import OBSERVATION_HEAD, observation_rows
+    from apo_bench.importers.recording.text import OBSERVATION_HEAD, observation_rows
 
-    sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, poses, sizes, [rest is not None for rest in rests]))
+    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, poses, rests, camera))

@@ -38,7 +38,7 @@ Fixed = Annotated[
 Order = Annotated[str | None, typer.Option(help="Order of the parts, with commas; default: an order that works.")]
 ClearanceMm = Annotated[
     float | None,
-    typer.Option(min=0.0, max=5.0, help="Clearance per side of faces that fit, mm; default: as drawn, or 0.25."),
+    typer.Option(min=0.0, max=5.0, help="Clearance per side of faces that fit, mm; default: 0.25."),
 ]
 MaxOverlapMm = Annotated[
     float,
@@ -118,15 +118,16 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.posed import UPS, read_posed
-    from apo_bench.importers.assembly.upright import drafted
-    from apo_bench.importers.assembly.writing import draft_lines, write_scenario
+    from apo_bench.importers.assembly.upright import USUAL_MM, new_upright_scenario
+    from apo_bench.importers.assembly.writing import choice_lines, write_scenario
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     require(up is None or up in UPS, f"--up must be one of {', '.join(UPS)}, got {up}.")
     names = [name.strip() for name in order.split(",")] if order else []
-    made = drafted(read_posed(poses, parts), up, fixed or (), clearance_mm, max_overlap_mm, names)
+    clearance_mm = USUAL_MM if clearance_mm is None else clearance_mm
+    made = new_upright_scenario(read_posed(poses, parts), up, fixed or (), clearance_mm, max_overlap_mm, names)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
-    typer.echo("\n".join(draft_lines(made)))
+    typer.echo("\n".join(choice_lines(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; next: apo-bench scenario check {shlex.quote(str(out))}")
 

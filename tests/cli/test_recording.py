@@ -45,7 +45,7 @@ def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.Ca
         found = read_observation(folder / out, NAME)
         assert np.abs(pose.log(pose.inverse(wanted) @ found.poses)[:, :3]).max() < 1e-3
     said = capsys.readouterr().out
-    assert "read as  lengths in mm; quaternions by the names of the columns" in " ".join(said.split("\n")[1].split(" "))
+    assert "read as  quaternions as wxyz" in " ".join(said.split("\n")[1].split(" "))
     assert (folder / "p.png").stat().st_size > 10_000
     assert (folder / "p.csv").read_text(encoding="utf-8").startswith("operation,part,t_s,x_mm")
     assert json.loads((folder / "a.json").read_text(encoding="utf-8"))["scenario"] == NAME

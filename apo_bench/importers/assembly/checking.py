@@ -1,12 +1,12 @@
-"""Whether human and robot can do a scenario, and which line of its file to change if not."""
+"""Check whether human and robot can do a scenario, and name the line of its file to change if not."""
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product, takewhile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from apo_bench.assembly import Plan, contact_kind, placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import extent, is_held
 from apo_bench.importers.assembly.posed import TABLE
+from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.importers.assembly.touching import walls_without_play
-from apo_bench.importers.assembly.waiting import stance
 from apo_bench.io import read_bytes
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
@@ -27,27 +27,22 @@ from apo_bench.trial.run import run_trial
 
 _ON_TABLE_M = 1e-4
 _STRUCK_M = 1e-4
-_NAMES = {
-    "screws and nuts are put in straight here, nothing is turned": re.compile(
-        r"(^|_)(m\d+(_|x|$)|screw|bolt|nut(_|$)|thread)", re.IGNORECASE
-    ),
-    "springs are rigid here": re.compile(r"(^|_)spring", re.IGNORECASE),
-}
-"""What names of parts give away."""
+_SCREW = re.compile(r"(^|_)(m\d+(_|x|$)|screw|bolt|nut(_|$)|thread|spring)", re.IGNORECASE)
+"""Names of parts that are turned or bent, which no trial does."""
 _REMEDIES = {
-    "collision": "operation {k}, grasp: hold the part elsewhere, or let what is struck start farther away",
+    "collision": "operation {k}, grasp: hold the part elsewhere, or let the struck part start farther away",
     "lost_grasp": "operation {k}, grasp: hold the part elsewhere",
     "force_stop": "operation {k}, attach: state another way, or give the parts more play",
-    "unreachable": "site: move it nearer to the arm, which stands at {base} mm",
-    "unreachable_start": "parts, {part}, start: let the part wait nearer to the arm, which stands at {base} mm",
+    "unreachable": "site: move it nearer to the arm",
+    "unreachable_start": "parts, {part}, start: let the part start nearer to the arm",
 }
 """Outcome of a trial -> what to change."""
-_NAMED = re.compile(r"operation (\d+)(?:, (\w+))?|parts, (\w+)(?:, (\w+))?|site\b")
-"""What sentences about scenario files begin with."""
+_LOCATION = re.compile(r"operation (\d+)(?:, (\w+))?|parts, (\w+)(?:, (\w+))?|site\b")
+"""The beginning of a sentence about a scenario file."""
 
 
 class Finding(NamedTuple):
-    """One thing that was looked at."""
+    """The result of one check."""
 
     what: str
     ok: bool
@@ -62,7 +57,10 @@ class Finding(NamedTuple):
 
 
 def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "six_axis") -> Iterator[Finding]:
-    """Look at a scenario file from its syntax to trials in which the robot knows the truth; each finding at once.
+    """Check a scenario file from its syntax to trials in which the robot knows the true poses.
+
+    Yields:
+        Each finding as soon as it is known.
 
     Raises:
         InputError: There is no such file.
@@ -73,11 +71,11 @@ def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "s
 
 
 def line_of(text: str, sentence: str) -> int | None:
-    """The line, from 1, of `operation 2, grasp` or `parts, pin, start`, with which sentences about files begin.
+    """Return the line, from 1, of `operation 2, grasp` or `parts, pin, start` at the beginning of a sentence.
 
-    Of a key that is not there: the line of its table.
+    A missing key is in the line of its table.
     """
-    named = _NAMED.match(sentence)
+    named = _LOCATION.match(sentence)
     if named is None:
         return None
     operation, operation_key, part, part_key = named.groups()
@@ -98,36 +96,37 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
     except InputError as error:
         yield Finding("file", False, str(error).removeprefix(f"{path}, ").removeprefix(f"{path}: "))
         return
-    yield Finding("file", True, _counted(scenario))
-    for what, look, well in (
-        ("parts", _parts, "no screw, nut or spring by its name"),
-        ("starts", _starts, "every part stands where it waits"),
-        ("ways", _ways, "a straight way leads every part to its place"),
-        ("play", _play, "no part is held between walls without play"),
-    ):
-        yield from _looked(what, look(scenario), well)
+    yield Finding("file", True, _summary(scenario))
+    yield from _check("parts", _parts(scenario), "no part is a screw, nut or spring by its name")
+    yield from _check("starts", _starts(scenario), "every part stands at its start")
+    yield from _check("ways", _ways(scenario), "a straight way leads every part to its place")
+    yield from _check("play", _play(scenario), "no part is held between walls without play")
     try:
         scene = build_scene(scenario, arm=arm)
     except InputError as error:
         # `operation 2: the grasp` names the key `grasp`.
-        sentence = re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error))
-        yield Finding("gripper", False, sentence)
+        yield Finding("gripper", False, re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error)))
         return
-    yield from _looked("gripper", _room(scenario, scene), "every part can be held and lifted")
+    yield from _check("gripper", _room(scenario, scene), "every part can be held and lifted")
     far = list(_reach(scenario, scene))
-    yield from _looked("reach", far, "the arm reaches every start and goal, wherever the site may be")
+    yield from _check("reach", far, "the arm reaches every start and goal, wherever the site may be")
     if far and (place := place_in_reach(scene, lambda nearer: not any(_reach(nearer.scenario, nearer)))):
         yield Finding("reach", False, place)
-    yield from _trials(replace(_ideal(path, arm), fidelity=fidelity), scenario, scene, seeds)
+    config = TrialConfig(str(path), arm=arm, noise_mm=0.0, noise_deg=0.0, method="oracle", fidelity=fidelity)
+    failures = list(_trials(replace(config, clearance_mm=scene.clearance_mm), scenario, scene, seeds))
+    yield from (Finding("oracle", False, sentence) for sentence in failures)
+    if seeds:
+        sentence = f"{seeds - len(failures)} of {seeds} trials in which the robot knows the truth are right"
+        yield Finding("oracle", not failures, sentence)
 
 
-def _looked(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
-    """What is wrong, or one finding that all is well."""
+def _check(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
+    """A finding for each wrong thing, or one that all is well."""
     findings = [Finding(what, False, sentence) for sentence in wrong]
     yield from findings or [Finding(what, True, well)]
 
 
-def _counted(scenario: Scenario) -> str:
+def _summary(scenario: Scenario) -> str:
     assembly = scenario.assembly
     contacts = [contact for operation in assembly.operations for contact in operation.contacts]
     kinds = Counter(str(contact_kind(*map(assembly.face_of, contact))) for contact in contacts)
@@ -137,20 +136,18 @@ def _counted(scenario: Scenario) -> str:
 
 
 def _parts(scenario: Scenario) -> Iterator[str]:
-    for part, (what, pattern) in product(scenario.assembly.solids, _NAMES.items()):
-        if pattern.search(part):
-            yield f"parts, {part}: by its name, and {what}; leave it out, or give it another name"
+    for part in filter(_SCREW.search, scenario.assembly.solids):
+        yield f"parts, {part}: nothing is screwed or bent here; leave the part out, or give it another name"
 
 
 def _starts(scenario: Scenario) -> Iterator[str]:
     for part, solid in scenario.assembly.solids.items():
         T = scenario.start[part]
-        if part in scenario.assembly.fixed or abs(extent(solid.pieces, T[2, :3])[0] + T[2, 3]) > _ON_TABLE_M:
-            continue
-        if not stance(solid, T[:3, :3]).stands:
+        is_on_table = abs(extent(solid.pieces, T[2, :3])[0] + T[2, 3]) <= _ON_TABLE_M
+        if part not in scenario.assembly.fixed and is_on_table and not find_stance(solid, T[:3, :3]).stands:
             yield (
-                f"parts, {part}, start: '{part}' does not stand like this and needs turning over, which the robot "
-                "cannot do; give it a foot, or let it wait in a nest, as `scenario new` makes them"
+                f"parts, {part}, start: '{part}' does not stand like this; give it a foot, or let it start in a "
+                "fixture, as `scenario new` makes them"
             )
 
 
@@ -166,8 +163,8 @@ def _play(scenario: Scenario) -> Iterator[str]:
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
         for contact, opposite in walls_without_play(assembly.solids, poses, operation.contacts):
             yield (
-                f"operation {k}, contacts: '{contact}' and '{opposite}' leave no play; say fit = true of the faces of "
-                "the slot in its part file, or make the part thinner"
+                f"operation {k}, contacts: '{contact}' and '{opposite}' leave no play; state fit = true for the faces "
+                "of the slot in its part file, or make the part thinner"
             )
 
 
@@ -182,23 +179,23 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
                 "hold it elsewhere"
             )
     layout = layout_at(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
-    believed = layout.start
+    poses = layout.start
     for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
         operation = scenario.assembly.operations[move.step.operation]
-        after = after_transfer(operation, move.transfer.T_world_goal, believed)
-        depth, other = struck_by(scene, move.transfer, believed, after)
+        after = after_transfer(operation, move.transfer.T_world_goal, poses)
+        depth, other = struck_by(scene, move.transfer, poses, after)
         if depth > _STRUCK_M:
             yield (
                 f"operation {move.step.operation + 1}, grasp: the open gripper would be {1e3 * depth:.2g} mm deep in "
-                f"'{other}' here, and no other place from above has room; let '{operation.main}' stand out higher"
+                f"'{other}', and no other place from above has room; let '{operation.main}' stand out higher"
             )
-        believed = after
+        poses = after
 
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
-    """In the middle of the site and at its corners, turned to either end."""
+    """Parts out of reach with the site in its middle or at a corner, turned to either end."""
     site = scenario.site
-    known = set[str]()
+    known = set[tuple[str, str]]()
     low, high = site.yaw_rad
     places = {(0, 0, (low + high) / 2), *((i, j, low if i == j else high) for i, j in product((-1, 1), (-1, 1)))}
     for i, j, yaw in sorted(places):
@@ -207,44 +204,24 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
         for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
             code = key_angles(move.transfer, scene).code
             part = move.transfer.part
-            if code and code + part not in known:
-                known.add(code + part)
+            if code and (code, part) not in known:
+                known.add((code, part))
                 k = move.step.operation + 1
-                remedy = _REMEDIES[code].format(k=k, part=part, base=_base(scene))
                 yield (
-                    f"{remedy}: the arm does not reach '{part}' in operation {k} with the site at "
-                    f"({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
+                    f"{_REMEDIES[code].format(k=k, part=part)}: the arm does not reach '{part}' in operation {k} with "
+                    f"the site at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
                 )
 
 
-def _ideal(path: Path, arm: str) -> TrialConfig:
-    """A trial in which the robot knows the truth."""
-    return TrialConfig(str(path), arm=arm, noise_mm=0.0, noise_deg=0.0, method="oracle")
-
-
-def _base(scene: Scene) -> str:
-    """`(-420, 0)`: where the arm stands, [mm]."""
-    return f"({1e3 * scene.arm.base[0]:g}, {1e3 * scene.arm.base[1]:g})"
-
-
-def _trials(settings: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[Finding]:
-    settings = replace(settings, clearance_mm=scene.clearance_mm)
-    failed = 0
+def _trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
+    """A sentence for each trial that fails."""
     for seed in range(seeds):
-        row = run_trial(replace(settings, seed=seed), scene)
-        if not row["success"]:
-            failed += 1
-            yield Finding("oracle", False, _failed(row, scenario, _base(scene)))
-    if seeds:
-        sentence = f"{seeds - failed} of {seeds} trials in which the robot knows the truth are right"
-        yield Finding("oracle", not failed, sentence)
-
-
-def _failed(row: Mapping[str, Any], scenario: Scenario, base: str) -> str:
-    """What went wrong in a trial, after what to change."""
-    k = row["failure_operation"]
-    part = scenario.assembly.operations[k - 1].main if k else ""
-    remedy = _REMEDIES.get(row["failure_code"])
-    change = f"{remedy.format(k=k, part=part, base=base)}: " if remedy else ""
-    who = "the human" if row["failure_stage"] == "demonstrate" else "the robot"
-    return f"{change}{who} with seed {row['seed']}: {row['sentence'].rstrip('.')}"
+        record = run_trial(replace(config, seed=seed), scene)
+        if record["success"]:
+            continue
+        k = record["failure_operation"]
+        part = scenario.assembly.operations[k - 1].main if k else ""
+        remedy = _REMEDIES.get(record["failure_code"] or "")
+        change = f"{remedy.format(k=k, part=part)}: " if remedy else ""
+        who = "the human" if record["failure_stage"] == "demonstrate" else "the robot"
+        yield f"{change}{who} with seed {seed}: {str(record['sentence']).rstrip('.')}"

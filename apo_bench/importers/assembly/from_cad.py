@@ -3,18 +3,20 @@
 from collections.abc import Container, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.cad.assembled import coming_near, mates_of
+from apo_bench.importers.cad.assembled import coming_near
 from apo_bench.importers.cad.importing import import_part, raw_solids
 from apo_bench.importers.cad.meshes.mesh_file import CadFile
 from apo_bench.importers.cad.places import named_places, write_places
-from apo_bench.importers.cad.solids.naming import part_name, title_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.naming import clean_title, part_name
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.importers.cad.solids.region import Region
 
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005
@@ -47,7 +49,7 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
     of_files: list[str] = []
     for file in files:
         source, solids = _solids_of(file, unit)
-        of_files += (f"{file.name}: {each}" for each in source.said)
+        of_files += (f"{file.name}: {each}" for each in source.warnings)
         found += [(file.name, raw) for raw in solids]
     if sum(len(raw.places) for _, raw in found) < 2:
         raise InputError(
@@ -56,8 +58,8 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
         )
     parts: dict[str, ImportedSolid] = {}
     raws = [raw for _, raw in found]
-    for (name, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
-        part = import_solid(raw, others, folder, name, parts, mates)
+    for (name, raw), others in zip(found, coming_near(raws), strict=True):
+        part = import_solid(raw, others, folder, name, parts)
         parts[part.name] = part
     copies = named_places({name: part.places for name, part in parts.items()})
     sources = ", ".join(file.name for file in files)
@@ -84,9 +86,7 @@ def _solids_of(file: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     return source, raws
 
 
-def import_solid(
-    raw: RawSolid, others: Array, folder: Path, source: str, used: Container[str], mates: Any = None
-) -> ImportedSolid:
+def import_solid(raw: RawSolid, others: Array, folder: Path, source: str, used: Container[str]) -> ImportedSolid:
     """Write one solid of an assembly as a part.
 
     Its frame lies at the part, wherever the file has its origin: a pose that is seen turned a little turns a part about
@@ -95,7 +95,6 @@ def import_solid(
     Args:
         others: What comes near to it, as `coming_near` has it.
         used: Names that it cannot have.
-        mates: All others where they are, as `mates_of` has them.
 
     Raises:
         InputError: It makes no part.
@@ -103,9 +102,8 @@ def import_solid(
     folder.mkdir(parents=True, exist_ok=True)
     name = part_name(raw.name, used)
     foot = _foot(raw)
-    mates = None if mates is None else mates.translate(-foot)
-    called = title_of(raw.name)
-    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {called}", others=others - foot, mates=mates)
+    called = clean_title(raw.name)
+    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {called}", others=others - foot)
     title = f" ({called})" if raw.name != name else ""
     said = [f"{name}{title}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]
     said += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]

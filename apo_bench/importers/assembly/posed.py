@@ -1,4 +1,4 @@
-"""Parts at their final poses: a file of poses is read, one table per copy of a part."""
+"""Parts at their final poses, read from a file of poses with one table per copy of a part."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
 TABLE = "table"
 _TAKEN = (TABLE, "arm")
-"""What a part of the scenario cannot be called: these are there already."""
+"""Names that a part of the scenario cannot have."""
 _MOST = 49
 _Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 UPS = {"x": (0, 1), "y": (1, 1), "z": (2, 1), "-x": (0, -1), "-y": (1, -1), "-z": (2, -1)}
@@ -37,7 +37,7 @@ class PosedPart:
     fit: Mapping[str, float] = field(default_factory=dict)
     """Faces that recede although the file does not say so, and by how much before the clearance, [mm]."""
     title: str = ""
-    """What the CAD file calls it, where that cannot be its name."""
+    """Its name in the CAD file, where that cannot be its name here."""
 
 
 class _Pose(msgspec.Struct, forbid_unknown_fields=True):
@@ -58,10 +58,10 @@ class _PoseFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
-    """Every copy of a part that a file of poses names.
+    """Read every copy of a part that a file of poses names.
 
     Args:
-        files: Part files, or names of parts of the package. What is not among them is looked for beside the poses.
+        files: Part files, or names of parts of the package. Other part files are beside the file of poses.
 
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
@@ -88,7 +88,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
-    """The same assembly, upright, its lowest point on the table, the middle of the box around it over the origin.
+    """Return the same assembly, upright, its lowest point on the table, its middle over the origin.
 
     Args:
         up: The axis of the poses that looks up, of `UPS`.

@@ -1,38 +1,36 @@
-"""Which faces touch at the nominal poses, and the poses at which they touch exactly.
+"""Find the faces that touch at the given poses, and the poses at which they touch exactly.
 
 Poses are exact but for the digits of a file and of a fit, so a face touches where its plane or axis lies within
-0.05 mm. Then all parts but the fixed ones are moved, each as little as can be, until every contact is closed.
+0.05 mm. Then all parts but the fixed ones move, each as little as possible, until every contact is closed.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from itertools import combinations, product
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 from apo_bench.scenario.checks import DEEP_M
 
 NEAR_M = 5e-5
 NEAR_RAD = 2e-3
 SHARE = 0.02
-"""A contact at the poses that were given."""
+"""Limits of a contact at the given poses: gap, angle, share of the face."""
 _CLOSED_M = 5e-7
 _CLOSED_RAD = 1e-4
-"""A contact of a scenario."""
+"""Limits of a closed contact."""
 _ROUNDS = 8
 _ARM_M = 0.05
-"""Turns count as what they move at this distance."""
-PLAY_M = 1e-3
-"""Flat walls that are so far apart fit."""
+"""The arm by which a turn counts as a length."""
 NO_PLAY_MM = 1e-3
 _COAXIAL_M = 1e-4
 _THREAD_M = 2.5e-3
-"""A shaft that is so much thicker than the hole around it is pressed in, or has a thread."""
+"""A shaft that is thicker than the hole around it by no more than this is pressed in, or has a thread."""
 
 
-def found_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR_M) -> tuple[Contact, ...]:
+def find_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR_M) -> tuple[Contact, ...]:
     """Every pair of faces of different parts that touch, or are no farther apart, in the order of the parts."""
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
@@ -41,7 +39,7 @@ def found_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEA
     )
 
 
-def closed(
+def close_contacts(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact], fixed: Iterable[str]
 ) -> tuple[Poses, tuple[Contact, ...], tuple[Contact, ...]]:
     """Poses at which contacts are closed, those contacts, and those that no poses close together with the others."""
@@ -49,22 +47,24 @@ def closed(
     dropped = list[Contact]()
     free = [part for part in solids if part not in set(fixed)]
     while True:
-        solved = _solved(solids, poses, kept, free)
-        off = [_off(solids, solved, contact) for contact in kept]
+        solved = _solve(solids, poses, kept, free)
+        off = [_openness(solids, solved, contact) for contact in kept]
         if not kept or max(off) <= 1.0:
             return solved, tuple(kept), tuple(dropped)
         # Contacts contradict each other: the one that is left farthest open goes, and all are closed again.
         dropped.append(kept.pop(int(np.argmax(off))))
 
 
-def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
-    """Press fits, threads, and other parts that are inside each other, one sentence each."""
+def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
+    """Return a sentence for each pair of parts that are inside each other, press fits and threads too."""
     sentences = list[str]()
     for a, b in combinations(solids, 2):
-        deep = intrusion(solids[a], poses[a], solids[b], poses[b])
-        inside = f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other: parts are rigid here, so give them room"
-        tight = next(_tight(solids, poses, a, b, clearance_mm, deep), inside if deep > DEEP_M else "")
-        sentences += [tight] * bool(tight)
+        deep_m = intrusion(solids[a], poses[a], solids[b], poses[b])
+        tight = _tight_fit(solids, poses, (a, b), clearance_mm, deep_m)
+        if tight:
+            sentences.append(tight)
+        elif deep_m > DEEP_M:
+            sentences.append(f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other; give them room")
     return sentences
 
 
@@ -88,26 +88,30 @@ def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Arra
     return np.asarray(poses[of.part][:3, :3] @ solids[of.part].faces[of.face].normal)
 
 
-def _tight(
-    solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float, deep_m: float
-) -> Iterator[str]:
-    """What shafts are that have no play in the holes around them; one that is less deep in than that ends before it."""
+def _tight_fit(
+    solids: Mapping[str, Solid], poses: Poses, pair: tuple[str, str], clearance_mm: float, deep_m: float
+) -> str:
+    """A sentence on a shaft without play in the hole around it; empty if there is none, or if it ends before the hole.
+
+    Args:
+        deep_m: How deep the parts are in each other.
+    """
+    a, b = pair
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
         play = play_mm(wall, other, clearance_mm) if contact_kind(wall, other) == "shaft in hole" else None
         if play is None or play > NO_PLAY_MM or geometric_play(wall, other) < -min(_THREAD_M, deep_m + NEAR_M):
             continue
         fit = mate(wall, poses[a], other, poses[b])
         if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
-            pair = ((a, wall), (b, other))
-            (inner, shaft), (outer, hole) = reversed(pair) if wall.hole else pair
-            yield (
-                f"'{inner}.{shaft.name}' is {2e3 * shaft.radius:.4g} mm thick in '{outer}.{hole.name}' of "
-                f"{2e3 * hole.radius:.4g} mm: a press fit or a thread, and parts are neither pressed nor screwed in "
-                f"here; make the hole wider, or say fit = true under [faces.{hole.name}] of its part"
+            return (
+                f"'{a}.{wall.name}' and '{b}.{other.name}' have radii of {1e3 * wall.radius:.4g} and "
+                f"{1e3 * other.radius:.4g} mm: a press fit or a thread, which no trial makes; make the hole wider, or "
+                "state fit = true for its face in its part file"
             )
+    return ""
 
 
-def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
+def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
     """Gauss-Newton with the least motion: residuals of all contacts, twists of all parts that are free to move."""
     now = {part: np.array(T) for part, T in poses.items()}
     first = {part: 6 * i for i, part in enumerate(free)}
@@ -155,7 +159,7 @@ def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Faci
     return next((pair for pair in pairs if (pair.a, pair.b) == (a.face, b.face)), None)
 
 
-def _off(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
+def _openness(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
     """How far a contact is from closed, 1 being as far as a scenario allows."""
     each = _facing(solids, poses, contact)
     if each is None:

@@ -1,70 +1,69 @@
-"""Which way up an assembly is put together, and on which of its parts: as asked, or the first way that works best."""
+"""Choose which axis of an assembly is up, and on which of its parts it is built: as stated, or what works first."""
 
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 from apo_bench.errors import InputError
-from apo_bench.importers.assembly.draft import Draft, NoOrder, draft, lowest
-from apo_bench.importers.assembly.loosening import LOOSEN_MM, filled, loosened
+from apo_bench.importers.assembly.added_clearance import MOST_OVERLAP_MM, add_clearance
+from apo_bench.importers.assembly.new_scenario import NewScenario, NoOrder, lowest, new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
 
 USUAL_MM = 0.25
-_FIRST = ("z", "-z", "x", "-x", "y", "-y")
+_UP_AXES = ("z", "-z", "x", "-x", "y", "-y")
 _MOST_BASES = 3
 
 
-def drafted(
+def new_upright_scenario(
     parts: Sequence[PosedPart],
     up: str | None = None,
     fixed: Sequence[str] = (),
-    clearance_mm: float | None = None,
-    loosen_mm: float = LOOSEN_MM,
-    asked: Sequence[str] = (),
-) -> Draft:
-    """The draft of an assembly, with an axis of its poses up.
+    clearance_mm: float = USUAL_MM,
+    most_overlap_mm: float = MOST_OVERLAP_MM,
+    wanted_order: Sequence[str] = (),
+) -> NewScenario:
+    """Make a scenario of an assembly, with an axis of its poses up.
 
     Args:
-        up: An axis of `posed.UPS`; None: z, unless parts then find no order, do not stand, or cannot be held, and
-            another axis is better.
-        clearance_mm: Room per side of faces that fit; None: as some parts were drawn, else `USUAL_MM`.
-        loosen_mm: Parts without play are given some where they are no deeper in each other; 0: none are.
-        asked: The parts that are moved, in the order in which they are put; none: any order.
+        up: An axis of `posed.UPS`; None: z, or the axis with the fewest parts that cannot be held.
+        clearance_mm: Room per side of faces that fit.
+        most_overlap_mm: Parts without play get some where they are no deeper in each other; 0: none do.
+        wanted_order: The moved parts in their order; none: any order.
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
         RuntimeError: Parts are inside each other, or there is no order in which they can be put together.
     """
-    parts, drawn_mm, said = filled(parts) if clearance_mm is None else (parts, None, ())
-    clearance_mm = next(mm for mm in (clearance_mm, drawn_mm, USUAL_MM) if mm is not None)
-    parts, more = loosened(parts, clearance_mm, loosen_mm)
-    tried: dict[str, Draft] = {}
+    parts, notes = add_clearance(parts, clearance_mm, most_overlap_mm)
+    found: dict[str, NewScenario] = {}
     failed: dict[str, NoOrder | InputError] = {}
-    for axis in (up,) if up else _FIRST:
+    for axis in (up,) if up else _UP_AXES:
         try:
-            made = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, asked)
+            scenario = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, wanted_order)
         except (NoOrder, InputError) as error:
             failed[axis] = error
             continue
-        tried[axis] = replace(made, notes=(*said, *more, *made.notes))
-        if not made.unfit:
+        found[axis] = replace(scenario, notes=(*notes, *scenario.notes))
+        if not scenario.unfit:
             break
-    if not tried:
+    if not found:
         raise next(iter(failed.values()))
-    best = min(tried, key=lambda axis: len(tried[axis].unfit))
+    best = min(found, key=lambda axis: len(found[axis].unfit))
     if up or best == "z":
-        return replace(tried[best], up=f"{best}, as asked" if up else best)
-    why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(tried["z"].unfit)
-    return replace(tried[best], up=f"{best}, as with z up {why}")
+        return replace(found[best], up=f"{best}, as asked" if up else best)
+    why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(found["z"].unfit)
+    return replace(found[best], up=f"{best}, as with z up {why}")
 
 
-def _on_a_base(parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float, asked: Sequence[str]) -> Draft:
-    """The draft on what is fixed, or on the largest of the parts that lie lowest with which there is an order."""
+def _on_a_base(
+    parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float, wanted_order: Sequence[str]
+) -> NewScenario:
+    """The scenario on the fixed parts, or on the largest of the lowest parts with which there is an order."""
     try:
-        return draft(parts, fixed, clearance_mm, asked)
+        return new_scenario(parts, fixed, clearance_mm, wanted_order)
     except NoOrder:
         for base in () if fixed else lowest(parts)[1:_MOST_BASES]:
             with suppress(NoOrder):
-                made = draft(parts, (base,), clearance_mm, asked)
-                return replace(made, why_fixed="it lies lowest; with larger ones that do there is no order")
+                scenario = new_scenario(parts, (base,), clearance_mm, wanted_order)
+                return replace(scenario, why_fixed="one of the lowest; with larger ones there is no order")
         raise

@@ -1,10 +1,12 @@
 """Regions become the faces of a part that can make contacts, [m]."""
 
 import numpy as np
+import shapely
 
 from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straighten
 from apo_bench.importers.cad.faces.fitting import ON_WALL
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, Region, square_to
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids.region import Region, square_to
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05
@@ -36,8 +38,6 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
 
     None if it has no single outline.
     """
-    import shapely
-
     n = region.direction
     flat = np.array(square_to(n))
     triangles = raw.mesh.corners[raw.mesh.triangles[region.triangles]] @ flat.T

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable
 
+import manifold3d
 import numpy as np
+import trimesh
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.pieces.cutting import Cut
 from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids.region import Region
 from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
 
 
@@ -27,16 +31,12 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
 
 def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
     """[m]: of what the pieces fill."""
-    import manifold3d
-
     hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
     return _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
 
 
 def _mesh_moments(mesh: Mesh) -> Moments:
     """Of a closed mesh, [mm]."""
-    import trimesh
-
     found = trimesh.Trimesh(mesh.corners, mesh.triangles, process=False).mass_properties
     # The integral of x x^T about the centroid is trace(J) / 2 - J, J being the inertia.
     second = np.trace(found.inertia) / 2.0 * np.eye(3) - found.inertia
@@ -45,8 +45,6 @@ def _mesh_moments(mesh: Mesh) -> Moments:
 
 def _behind_sides(mesh: Mesh, wall: Region) -> Moments:
     """Between a round wall and its sides, [mm]."""
-    import manifold3d
-
     corners = mesh.corners[np.unique(mesh.triangles[wall.triangles])]
     within = _mesh_moments(mesh_of(manifold3d.Manifold.hull_points(corners)))
     true = frustum_moments(*wall.span, *wall.radii).moved(np.column_stack([*wall.across, wall.direction]), wall.point)

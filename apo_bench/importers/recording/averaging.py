@@ -1,4 +1,4 @@
-"""Poses of one rest become one pose: a mean on SE(3) without outliers, and the covariance that they show."""
+"""The mean of the poses of one rest on SE(3) without outliers, and its covariance."""
 
 from dataclasses import dataclass
 from typing import final
@@ -62,7 +62,7 @@ def average(T: Array) -> Mean:
     return Mean(middle, xi.T @ xi / max(len(xi) - 1, 1), inlier, _independent(xi))
 
 
-def pooled_mean(mean: Mean, others: Array) -> Mean:
+def pool_mean(mean: Mean, others: Array) -> Mean:
     """The mean with a covariance that also knows the frames of other rests.
 
     Args:

@@ -1,11 +1,11 @@
 """OBJECTS.toml: which id of a log is which part, and where the part's frame lies in the tracker's model."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple, final
 
-from apo_bench.errors import InputError, one_line, require, unknown
+from apo_bench.errors import one_line, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.camera_file import NamedEntries
 from apo_bench.importers.recording.tracks import Log, PoseTrack
@@ -13,7 +13,7 @@ from apo_bench.io import Table, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
 
 _MOST_IDS = 12
-"""So many ids are named in a sentence."""
+"""An error names no more ids than this."""
 
 
 class ObjectTable(Table, frozen=True, kw_only=True):
@@ -24,7 +24,7 @@ class ObjectTable(Table, frozen=True, kw_only=True):
 
 
 class ObjectsTable(Table, frozen=True, kw_only=True):
-    """What stands in the file."""
+    """The tables of the file."""
 
     schema: Literal["apo-bench/objects/1"]
     objects: NamedEntries
@@ -42,7 +42,7 @@ class TrackedPart(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class ObjectsFile:
-    """What an objects file states."""
+    """The parts that an objects file names."""
 
     file: str
     parts: Mapping[str, TrackedPart]
@@ -56,10 +56,10 @@ class ObjectsFile:
 
 
 def read_objects(path: str | Path) -> ObjectsFile:
-    """What an objects file states.
+    """Read an objects file.
 
     Raises:
-        InputError: Anything that is not as described, naming file and key.
+        InputError: A key or value is wrong; the message names it.
     """
     top = read_typed(path, ObjectsTable, "objects file")
     parts: dict[str, TrackedPart] = {}
@@ -74,17 +74,14 @@ def read_objects(path: str | Path) -> ObjectsFile:
     return ObjectsFile(str(path), parts, frozenset(map(str, top.ignore)))
 
 
-def name_tracks(log: Log, objects: ObjectsFile, hands: Collection[str] = ()) -> Mapping[str, PoseTrack]:
-    """The tracks of parts, camera from part.
-
-    Args:
-        hands: Ids of hands and grippers, which are no parts.
+def name_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
+    """Return the tracks of parts, camera from part.
 
     Raises:
         InputError: An id of the log is no part, or a part is not in the log.
     """
     known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
-    strange = [f"'{one_line(name, 60)}'" for name in log.tracks if name not in known and name not in hands]
+    strange = [f"'{one_line(name, 60)}'" for name in log.tracks if name not in known]
     require(
         not strange,
         f"{log.file}: the id {', '.join(strange[:_MOST_IDS])} is no part; name its part in {objects.file}, or add it "
@@ -92,9 +89,7 @@ def name_tracks(log: Log, objects: ObjectsFile, hands: Collection[str] = ()) -> 
     )
     tracks: dict[str, PoseTrack] = {}
     for part, tracked in objects.parts.items():
-        if tracked.id not in log.tracks:
-            sentence = unknown("id", tracked.id, log.tracks).replace("Known", "In the log")
-            raise InputError(f"{objects.file}, {part}: {sentence}")
+        require_known("id", tracked.id, log.tracks, place=f"{objects.file}, {part}")
         t, T = log.tracks[tracked.id]
         tracks[part] = PoseTrack(t, T @ tracked.T_model_part)
     return tracks

@@ -1,4 +1,4 @@
-"""Where a part rests: the frames between two changes of its pose.
+"""Find where a part rests: the frames between two changes of its pose.
 
 A frame is still if the medians of the frames just before and just after it agree within the noise of the track itself;
 a stretch of still frames is a rest. Small shifts that no such window shows, such as those of a part that is adjusted by
@@ -12,7 +12,7 @@ from typing import TypeVar, final
 import numpy as np
 
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.importers.recording.averaging import Mean, average, common_scatter, pooled_mean
+from apo_bench.importers.recording.averaging import Mean, average, common_scatter, pool_mean
 from apo_bench.importers.recording.tracks import PoseTrack
 
 LEAST_REST_S = 0.3
@@ -34,8 +34,6 @@ _SAME_RAD = 5e-3
 """Rests that differ by less are one."""
 _EDGE = 16.8
 """The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
-
-
 _Item = TypeVar("_Item")
 _Span = tuple[int, int]
 """First and last frame."""
@@ -43,7 +41,7 @@ _Span = tuple[int, int]
 
 @final
 @dataclass(frozen=True, eq=False)
-class RestSpan:
+class Rest:
     """A stretch of a track in which the part rests."""
 
     first: int
@@ -57,55 +55,42 @@ class RestSpan:
     mean: Mean
 
     @property
-    def seconds(self) -> float:
-        return self.ends - self.begins
-
-    @property
     def T(self) -> Array:
         return self.mean.T
 
 
-def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
-    """The rests of a track, in order of time: looked for in frames that are new, averaged over all."""
+def find_rests(track: PoseTrack) -> tuple[Rest, ...]:
+    """Return the rests of a track, in order of time: found in frames that are new, averaged over all frames."""
     stride = _stride(track)
     t = track.t[::stride]
     T = track.T[::stride]
     if len(t) < _FEWEST:
         return ()
     noise = np.maximum(_noise(T), _LEAST)
-    half_window = max(3, round(0.5 * LEAST_REST_S / max(float(np.median(np.diff(t))), 1e-6)))
+    period_s = max(float(np.median(np.diff(t))), 1e-6)
+    half_window = max(3, round(0.5 * LEAST_REST_S / period_s))
     spans = list[_Span]()
     for span in _still_spans(T, noise, half_window):
-        a, b = _trimmed(T, *span, noise)
+        a, b = _trim(T, *span, noise)
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    # Neighbouring stretches of one pose become one, unless the part went away and came back.
-    groups = consecutive(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window))
+    # Neighbouring spans of one pose become one, unless the part left and returned.
+    groups = group_consecutive(
+        spans, lambda group, span: _is_one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window)
+    )
     ends = [(group[0][0], group[-1][1]) for group in groups]
     spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
-    last_seen = np.flatnonzero(np.diff(track.t) > least_rest_s(track))
-    return tuple(
-        RestSpan(
-            a,
-            b,
-            float(track.t[a]),
-            float(track.t[b]),
-            # The last frames of a rest may be off by chance, so that it ends a few frames before the part was hidden.
-            max((float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride), default=float(track.t[b])),
-            pooled_mean(mean, common),
-        )
-        for (a, b), mean in zip(spans, means, strict=True)
-    )
-
-
-def least_rest_s(track: PoseTrack) -> float:
-    """How long a part has to rest to be seen resting, [s]."""
-    stride = _stride(track)
-    if len(track.t) <= stride:
-        return LEAST_REST_S
-    return float(max(LEAST_REST_S, (2 * _FEWEST - 1) * np.median(np.diff(track.t[::stride]))))
+    hidden_s = max(LEAST_REST_S, (2 * _FEWEST - 1) * period_s)
+    last_seen = np.flatnonzero(np.diff(track.t) > hidden_s)
+    rests = []
+    for (a, b), mean in zip(spans, means, strict=True):
+        # The last frames of a rest may be off by chance, so that it ends a few frames before the part was hidden.
+        seen_again = [float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride]
+        begins, ends_s = float(track.t[a]), float(track.t[b])
+        rests.append(Rest(a, b, begins, ends_s, max(seen_again, default=ends_s), pool_mean(mean, common)))
+    return tuple(rests)
 
 
 def _stride(track: PoseTrack) -> int:
@@ -148,7 +133,7 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
     return list(zip(first.tolist(), last.tolist(), strict=True))
 
 
-def _trimmed(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
+def _trim(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
     """Without frames at the ends that still move: three in a row of them belong to the rest."""
     quarter = (b - a + 1) // 4
     off = pose.log(pose.inverse(average(T[a + quarter : b + 1 - quarter]).T) @ T[a : b + 1])
@@ -192,7 +177,7 @@ def _alike(xi: Array) -> float:
     return (1.0 + r) / (1.0 - min(r, 0.99))
 
 
-def consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
+def group_consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
     """Items in their order, in groups: each with those just before it, if it belongs to them."""
     groups: list[list[_Item]] = []
     for item in items:
@@ -203,7 +188,7 @@ def consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Ite
     return groups
 
 
-def _one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
+def _is_one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
     mean, mean_after = (average(T[a : b + 1]) for a, b in (before, after))
     off = pose.log(pose.inverse(mean.T) @ mean_after.T)
     deviation = noise * np.sqrt(1.0 / mean.independent + 1.0 / mean_after.independent)

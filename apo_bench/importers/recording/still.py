@@ -4,7 +4,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.rests import RestSpan, rests_of
+from apo_bench.importers.recording.rests import Rest, find_rests
 from apo_bench.importers.recording.tracks import Log, PoseTrack
 from apo_bench.perception.observation.models import Camera, Residuals
 
@@ -25,7 +25,7 @@ def still_residuals(log: Log) -> Residuals:
     distance = list[float]()
     camera = Camera(np.eye(4))
     for part, track in enumerate(log.tracks.values()):
-        for rest in rests_of(track):
+        for rest in find_rests(track):
             seen = _errors(camera, track, rest)
             # Frames that are missing between others, by the usual time between two.
             steps = np.diff(track.t[rest.first : rest.last + 1])
@@ -47,7 +47,7 @@ def still_residuals(log: Log) -> Residuals:
     )
 
 
-def _errors(camera: Camera, track: PoseTrack, rest: RestSpan) -> Array:
+def _errors(camera: Camera, track: PoseTrack, rest: Rest) -> Array:
     """(n, 6), (x, y, along; rx, ry, about), [m, rad]: from the mean of a rest to each frame.
 
     A mean of n frames takes part of each error with it, so what is left is as much larger as it was made smaller.

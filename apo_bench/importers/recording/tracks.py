@@ -1,23 +1,20 @@
-"""What a tracker wrote: one track per id, poses of its model in the frame of the camera."""
+"""The tracks of a log: the poses of each model over time, in the frame of the camera."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
-from types import MappingProxyType
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 
-_NEAR_M = 0.02
-_FAR_M = 20.0
-"""Models whose median distance to the camera is less or more were given in another unit."""
-_FAST_S = 2e-4
-_SLOW_S = 2.0
-"""Frames whose median distance in time is less or more have times in another unit."""
+_NEAREST_M = 0.02
+_FARTHEST_M = 20.0
+"""A median distance to the camera outside of these is in another unit."""
+_FASTEST_S = 2e-4
+_SLOWEST_S = 2.0
+"""A median time between two frames outside of these is in another unit."""
 
 
 class PoseTrack(NamedTuple):
@@ -55,48 +52,42 @@ class LogRows(NamedTuple):
 
 
 def sort_rows(file: str, rows: LogRows) -> Log:
-    """The tracks of a log, each with increasing times.
+    """Return the tracks of a log, each with increasing times.
 
     Raises:
-        InputError: Nothing stands in it, a time stands twice or runs backwards, or a unit is another one.
+        InputError: The log is empty, a time stands twice or runs backwards, or a unit is another one.
     """
     require(len(rows.t), f"{file}: no pose stands in the file; give a log with one row per pose.")
-    names, which = np.unique(np.array(rows.ids, dtype=object).astype(str), return_inverse=True)
     tracks = {}
-    # Trackers write the identity for a frame in which they lost a model. A track of nothing else is a model that stays.
-    identity = (np.eye(4) == rows.T).all(axis=(1, 2))
     lost = 0
-    for i, name in enumerate(names.tolist()):
-        at = np.flatnonzero(which == i)
-        _check_times(rows, name, at)
-        if not identity[at].all():
-            lost += int(identity[at].sum())
-            at = at[~identity[at]]
+    # A tracker writes the identity where it lost a model, unless the model has no other pose.
+    is_identity = (np.eye(4) == rows.T).all(axis=(1, 2))
+    names = np.array(rows.ids, dtype=object)
+    for name in sorted(set(rows.ids)):
+        at = np.flatnonzero(names == name)
+        backwards = np.flatnonzero(np.diff(rows.t[at]) <= 0.0)
+        if len(backwards):
+            place = rows.places[at[backwards[0] + 1]]
+            raise InputError(
+                f"{place}: the time of '{one_line(name, 60)}' stands twice or runs backwards; give one pose for each "
+                "time, in the order in which they were recorded."
+            )
+        if not is_identity[at].all():
+            lost += int(is_identity[at].sum())
+            at = at[~is_identity[at]]
         tracks[name] = PoseTrack(rows.t[at] - rows.t.min(), rows.T[at])
-    distance = float(np.median(np.linalg.norm(rows.T[~identity if lost else slice(None), :3, 3], axis=1)))
+    distance = np.median(np.linalg.norm(np.concatenate([track.T for track in tracks.values()])[:, :3, 3], axis=1))
     require(
-        _NEAR_M <= distance <= _FAR_M,
+        _NEAREST_M <= distance <= _FARTHEST_M,
         f"{file}: the median distance to the camera is {distance * 1e3:.3g} mm, so its lengths are in another unit; "
         "state it: columns such as x_mm or x_m, or `length` in the camera file.",
     )
-    steps = [float(step) for track in tracks.values() for step in np.diff(track.t)]
-    usual = median(steps) if steps else _SLOW_S
+    steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
+    usual = np.median(steps) if len(steps) else _SLOWEST_S
     require(
-        _FAST_S <= usual <= _SLOW_S,
+        _FASTEST_S <= usual <= _SLOWEST_S,
         f"{file}: the median time between two frames of a track is {usual:.3g} s, so its times are in "
         "another unit; state it: a column such as t_ms or t_s, or `time` in the camera file.",
     )
     left_out = [f"{lost} poses that are the identity left out as lost frames"] if lost else []
-    return Log(file, MappingProxyType(tracks), (*rows.notes, *left_out))
-
-
-def _check_times(rows: LogRows, name: str, at: NDArray[np.intp]) -> None:
-    steps = np.diff(rows.t[at])
-    wrong = np.flatnonzero(steps <= 0.0)
-    if len(wrong):
-        k = int(wrong[0])
-        fault = "stands twice" if steps[k] == 0.0 else f"is {-steps[k]:.6g} s before the one above it"
-        raise InputError(
-            f"{rows.places[at[k + 1]]}: a time of '{one_line(name, 60)}' {fault}; give one pose for each time, in the "
-            "order in which they were recorded."
-        )
+    return Log(file, tracks, (*rows.notes, *left_out))

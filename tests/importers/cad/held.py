@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from apo_bench.importers.cad.importing import Imported
+from apo_bench.importers.cad.importing import ImportedPart
 from tests.importers.cad.made import Made
 
 FREE_MM = 0.01
 VOLUME = 1e-3
 
 
-def hold(done: Imported, made: Made, within_mm: float) -> None:
+def hold(done: ImportedPart, made: Made, within_mm: float) -> None:
     """Faces right in number and kind, radii within so much, volume and free radii."""
     whole = [r for r in done.raw.regions if r.is_whole]
     assert sum(r.kind == "plane" for r in done.raw.regions) == made.flats

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 from apo_bench import InputError
 from apo_bench.geometry import Face
 from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.importing import _why_not, import_part, raw_solids
+from apo_bench.importers.cad.importing import _fault, import_part, raw_solids
 from apo_bench.importers.cad.part_report import file_lines, part_lines, report_part
 from apo_bench.importers.cad.pieces.corners import corners_of, without_near
 from apo_bench.importers.cad.step.from_brep import raw_of
@@ -43,8 +43,8 @@ def test_a_face_whose_hole_crosses_its_border_is_no_face() -> None:
     hole = 0.2 * square[::-1]
     solid = load_part("block")
     beside = hole + np.array([0.01, 0.0, 0.0])
-    assert _why_not(solid, Face("top", square, (beside,))) == "its outline crosses itself"
-    assert _why_not(solid, Face("top", square, (hole,))) != "its outline crosses itself"
+    assert _fault(solid, Face("top", square, (beside,))) == "its outline crosses itself"
+    assert _fault(solid, Face("top", square, (hole,))) != "its outline crosses itself"
 
 
 def test_corners_that_nearly_meet_are_joined(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
     assert raw_solids(path, "mm")[0][:2] == ("mm", "as asked")
     lines = list(part_lines(report_part(import_part(raw, "lid", tmp_path, "lid.stl"))))
     assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")
-    assert "    px: flat, looks along (1, 0, 0), 20.0625 mm from the origin" in lines
+    assert "    px: flat, normal (1, 0, 0), 20.0625 mm from the origin" in lines
     assert any(
         line.startswith("    hole1: hole, cylinder of 32 sides, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
         for line in lines

@@ -9,20 +9,20 @@ from scipy.spatial import ConvexHull
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.assembled import coming_near, surface_points
-from apo_bench.importers.cad.faces.regions import regions_of
+from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.pieces import refining
 from apo_bench.importers.cad.pieces.cut_part import CutPart
 from apo_bench.importers.cad.pieces.cutting import cut
 from apo_bench.importers.cad.pieces.refining import depths
 from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.naming import with_names
+from apo_bench.importers.cad.solids.naming import name_regions
 from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
 from tests.importers.cad.made import block, rod
 
 
 def raw_of(name: str, body: Manifold) -> RawSolid:
     mesh = mesh_of(body)
-    return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), with_names(mesh, regions_of(mesh)))
+    return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), name_regions(mesh, find_regions(mesh)))
 
 
 def rounded(x: float, y: float, r: float) -> CrossSection:

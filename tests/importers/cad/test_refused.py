@@ -101,7 +101,7 @@ def test_shells_that_go_through_each_other_are_united_and_it_is_said(tmp_path: P
     path = write_triangles(shells(block(20, 20, 20), block(10, 10, 40, (3, 2, -7))), tmp_path / "a.stl")
     _, (raw,) = raw_solids(path, None)
     assert raw.mesh.volume == pytest.approx(8000 + 10 * 10 * 20)
-    assert raw.mended == ("2 closed shells, some of which go through each other, became 1",)
+    assert raw.repairs == ("2 closed shells, some of which go through each other, became 1",)
 
 
 @pytest.mark.parametrize("at", [(20, 0, 0), (0, 0, 20), (20, 20, 0), (20, 5, 3)])
@@ -153,13 +153,13 @@ def test_inside_out_is_turned_and_said(tmp_path: Path) -> None:
     path = write_triangles(triangles(block(20, 20, 20) - rod(4, 20))[:, ::-1], tmp_path / "a.stl")
     _, (raw,) = raw_solids(path, None)
     assert raw.mesh.volume > 0.0
-    assert raw.mended == ("it was inside out, and was turned",)
+    assert raw.repairs == ("it was inside out, and was turned",)
 
 
 def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
     given = triangles(block(20, 20, 20))
     given[::3] = given[::3, ::-1]
-    with pytest.raises(InputError, match="neighbouring triangles look different ways"):
+    with pytest.raises(InputError, match="neighbouring triangles face different ways"):
         raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
 
 
@@ -191,7 +191,6 @@ def test_the_command_says_what_it_did_and_names_as_asked(tmp_path: Path, capsys:
     for words in (
         "unit mm",
         "40 x 30 x 10 mm",
-        "watertight",
         "6 plane, 1 cylinder",
         "bore: hole",
         "free radius 4",

@@ -12,10 +12,11 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold
 
-from apo_bench.importers.cad.faces.regions import regions_of
+from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.meshes.shells import closed_solids
 from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, Region
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.region import Region
 from tests.importers.cad.made import block, prism, rod
 
 
@@ -24,7 +25,7 @@ def found(drawn: Any) -> tuple[Region, ...]:
     is_body = isinstance(drawn, Manifold)
     mesh = mesh_of(drawn) if is_body else Mesh(np.asarray(drawn.vertices, dtype=float), np.asarray(drawn.faces))
     (solid,) = closed_solids(Path("a.stl"), "a", mesh)
-    return regions_of(solid.mesh)
+    return find_regions(solid.mesh)
 
 
 def flat_ball() -> Any:

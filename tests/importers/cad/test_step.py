@@ -14,7 +14,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.cad.importing import Imported, import_part, raw_solids
+from apo_bench.importers.cad.importing import ImportedPart, import_part, raw_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.open_cascade import solids_of
 from tests.importers.cad.brep_made import brep_made, write_step
@@ -37,7 +37,7 @@ KINDS = [
 ]
 
 
-def imported(shape: Any, folder: Path) -> Imported:
+def imported(shape: Any, folder: Path) -> ImportedPart:
     """In this process, which has read build123d already."""
     path = write_step(shape, folder / "a.step")
     (solid,) = solids_of(path)

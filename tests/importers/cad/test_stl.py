@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -25,28 +24,25 @@ def with_count(raw: bytes, count: int) -> bytes:
     return raw[:80] + count.to_bytes(4, "little") + raw[84:]
 
 
-READ: dict[str, tuple[Callable[[bytes], bytes], int]] = {
-    "as it is": (lambda raw: raw, 0),
-    "bytes behind it": (lambda raw: raw + b"trailer", 0),
-    "many bytes behind it": (lambda raw: raw + bytes(333), 0),
-    "count 0": (lambda raw: with_count(raw, 0), 1),
-    "count unknown": (lambda raw: with_count(raw, 2**32 - 1), 1),
-    "count too small": (lambda raw: with_count(raw, 5), 1),
-    "a header as of a text file": (lambda raw: b"solid a".ljust(80) + raw[80:], 0),
+READ: dict[str, Callable[[bytes], bytes]] = {
+    "as it is": lambda raw: raw,
+    "bytes behind it": lambda raw: raw + b"trailer",
+    "many bytes behind it": lambda raw: raw + bytes(333),
+    "count 0": lambda raw: with_count(raw, 0),
+    "count unknown": lambda raw: with_count(raw, 2**32 - 1),
+    "count too small": lambda raw: with_count(raw, 5),
+    "a header as of a text file": lambda raw: b"solid a".ljust(80) + raw[80:],
 }
 
 
 @pytest.mark.parametrize("case", READ)
-def test_triangles_are_read_and_a_wrong_count_is_reported(case: str, tmp_path: Path) -> None:
-    change, said = READ[case]
-    (tmp_path / "a.stl").write_bytes(change(brick(tmp_path)))
-    file, (raw,) = raw_solids(tmp_path / "a.stl", None)
+def test_triangles_are_read_in_spite_of_a_wrong_count(case: str, tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(READ[case](brick(tmp_path)))
+    _, (raw,) = raw_solids(tmp_path / "a.stl", None)
     assert raw.mesh.volume == pytest.approx(6000.0)
-    assert len(file.said) == said
 
 
 REFUSED: dict[str, tuple[Callable[[bytes], bytes], str]] = {
-    "gzip": (gzip.compress, "packed with gzip; unpack it"),
     "cut short": (lambda raw: raw[:-20], "states 12 triangles and holds 11 and a part of one"),
     "cut between triangles": (lambda raw: raw[:-50], "the shell is open"),
     "count 0 and bytes behind it": (lambda raw: with_count(raw, 0) + b"abc", "states 0 triangles and holds 12"),

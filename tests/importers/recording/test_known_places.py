@@ -7,9 +7,9 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.arranging import CameraPose, solve_camera
 from apo_bench.importers.recording.averaging import Mean
-from apo_bench.importers.recording.ordering import contact_fit
+from apo_bench.importers.recording.camera_pose import CameraPose, solve_camera
+from apo_bench.importers.recording.contact_fit import contact_fit
 from apo_bench.scenario.layout import layout_at
 from tests.recorded import CAMERA
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.rests import LEAST_REST_S, rests_of
-from apo_bench.importers.recording.stays import poses_at, stays_of
+from apo_bench.importers.recording.rest_intervals import find_intervals, poses_at
+from apo_bench.importers.recording.rests import LEAST_REST_S, find_rests
 from apo_bench.importers.recording.tracks import PoseTrack
 from tests.recorded import RATE_HZ, seen
 
@@ -29,12 +29,12 @@ def adjusted(mm: float, first: int, last: int) -> PoseTrack:
 
 def test_rests_last_as_long_as_they_did() -> None:
     for track in seen("stick_in_tower", 0.3).values():
-        rests = rests_of(track)
-        assert all(rest.seconds == pytest.approx(track.t[rest.last] - track.t[rest.first]) for rest in rests)
+        rests = find_rests(track)
+        assert all(rest.ends - rest.begins == pytest.approx(track.t[rest.last] - track.t[rest.first]) for rest in rests)
         assert rests[0].begins == pytest.approx(0.0, abs=0.1)
         assert rests[-1].ends == pytest.approx(track.t[-1], abs=0.1)
         # a part is carried for 1 s, of which the slow beginning and end may look like rest
-        assert sum(rest.seconds for rest in rests) == pytest.approx(
+        assert sum(rest.ends - rest.begins for rest in rests) == pytest.approx(
             track.t[-1] - len(rests) + 1.0, abs=0.4 * len(rests)
         )
 
@@ -42,15 +42,15 @@ def test_rests_last_as_long_as_they_did() -> None:
 @pytest.mark.parametrize(("frames", "rests"), [(5, 1), (20, 2)])
 def test_a_few_frames_beside_a_rest_are_no_rest(frames: int, rests: int) -> None:
     """Pushed by 0.55 mm along two axes, which no single frame shows."""
-    spans = rests_of(adjusted(0.55, 120, frames))
+    spans = find_rests(adjusted(0.55, 120, frames))
     assert len(spans) == rests
-    assert all(rest.seconds >= LEAST_REST_S / 2 for rest in spans)
+    assert all(rest.ends - rest.begins >= LEAST_REST_S / 2 for rest in spans)
 
 
 def test_an_adjusted_part_stays_and_is_where_it_was_last() -> None:
     track = adjusted(2.0, 60, 60)
-    stays = stays_of("peg", rests_of(track))
-    assert [len(stay.rests) for stay in stays] == [2]
+    intervals = find_intervals("peg", find_rests(track))
+    assert [len(each.rests) for each in intervals] == [2]
     for t, frame in ((-1.0, 0), (1.0, 0), (3.0, -1), (9.0, -1)):
-        off = pose.log(pose.inverse(poses_at({"peg": stays}, t)["peg"]) @ track.T[frame])
+        off = pose.log(pose.inverse(poses_at({"peg": intervals}, t)["peg"]) @ track.T[frame])
         assert np.abs(off[:3]).max() < 1e-4

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.importers.cad.solids.raw_solid import Mesh, connected
+from apo_bench.importers.cad.solids.mesh import Mesh, connected
 
 FEWEST_SIDES = 12
 """Flat pieces are taken for a round face if a whole turn of it has so many, or more."""

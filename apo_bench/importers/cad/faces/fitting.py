@@ -3,10 +3,12 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
-from apo_bench.importers.cad.solids.raw_solid import Mesh, Region, square_to
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.region import Region, square_to
 
 _MOST_POINTS = 400
 _TURNED = 0.09
@@ -73,8 +75,6 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
 
     None: there is no start, there are too few points, or nothing fits.
     """
-    from scipy.optimize import least_squares
-
     if start is None:
         return None
     points = points[:: -(-len(points) // _MOST_POINTS)]

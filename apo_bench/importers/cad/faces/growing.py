@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
 from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
-from apo_bench.importers.cad.solids.raw_solid import Mesh, connected
+from apo_bench.importers.cad.solids.mesh import Mesh, connected
 
 _FEWEST = 3
 _MOST_WORK = 3_000_000

@@ -11,7 +11,8 @@ from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, facets_of
 from apo_bench.importers.cad.faces.fitting import fitted_plane, round_region
 from apo_bench.importers.cad.faces.growing import FoundWall, smooth_groups, walls_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, Region, square_to
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.region import Region, square_to
 
 _LARGER = 8.0
 """A flat piece so much larger than most of its neighbours on a free surface, slivers aside, is a plane beside it."""
@@ -39,7 +40,7 @@ class _End(NamedTuple):
         )
 
 
-def regions_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
+def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     """The faces of a closed mesh, in an order that its triangles give.
 
     Args:

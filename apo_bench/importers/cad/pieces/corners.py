@@ -3,9 +3,10 @@
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.solids.raw_solid import SAME_CORNER_MM, square_to
+from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, square_to
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300
@@ -41,8 +42,6 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
         flats: Planes of flat faces, (k, 4).
         cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
     """
-    from scipy.spatial import ConvexHull
-
     points = np.round(without_near(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
     hull = Hull("", 1e-3 * corners)
@@ -60,8 +59,6 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
 
 def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
     """The corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
-    from scipy.spatial import ConvexHull
-
     corners = corners[np.sort(ConvexHull(corners).vertices)]
     if _is_simple(Hull("", 1e-3 * corners)):
         return np.asarray(corners)
@@ -114,15 +111,11 @@ def _farthest(corners: Array, many: int) -> Any:
 
 def without_near(points: Array) -> Array:
     """Points without those that are near to an earlier one."""
-    from scipy.spatial import cKDTree
-
     return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
 
 
 def is_thick(points: Array) -> bool:
     """Whether points span more than a sheet."""
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         planes = ConvexHull(points).equations
     except QhullError:

@@ -10,7 +10,7 @@ from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.pieces.refining import Beside, refined
 from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.raw_solid import Region
+from apo_bench.importers.cad.solids.region import Region
 
 _MOST_CUTS = 400
 _TRIES = 6
@@ -108,7 +108,7 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
     return parts
 
 
-def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
+def cut_at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
     """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
     for part in parts:
         # So many corners of a part are on the wall of a shaft that it is one.
@@ -128,7 +128,7 @@ def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]
     return (part,) if is_beside else part.halves(n, d, hair)
 
 
-def settled(corners: Array, planes: Array, size: float) -> Array:
+def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
     """Corners that are a hair's breadth off the planes of cuts, on them."""
     corners = corners.copy()
     # A corner on two or three planes is brought onto them in turns, as each step leaves the other ones a little.

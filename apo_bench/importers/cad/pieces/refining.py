@@ -11,13 +11,16 @@ from heapq import heapify, heappop, heappush
 from itertools import count
 from typing import Any, NamedTuple, final
 
+import manifold3d
 import numpy as np
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import LEFT_MM, is_thick, reduced
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.raw_solid import Mesh, square_to
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.region import square_to
 
 _DEEP_MM = 0.04
 _FAR = 0.005
@@ -151,8 +154,6 @@ def _hollow(mesh: Mesh) -> tuple[Array, Array, Array]:
 
 def _planes(corners: Array) -> Array:
     """Of the sides of a hull, n . x = d, each once, (k, 4); none of what is flat."""
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         planes = ConvexHull(corners).equations * [1.0, 1.0, 1.0, -1.0]
     except (QhullError, ValueError):
@@ -173,9 +174,6 @@ def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPa
 
 def _within(part: CutPart, beside: Beside) -> CutPart:
     """The hull of a part less what its free sides bridge of hollows, unless too much of the part would go with it."""
-    import manifold3d
-    from scipy.spatial import HalfspaceIntersection, cKDTree
-
     corners = mesh_of(part.body).corners
     hollow, _, planes = _hollow(mesh_of(part.body))
     # Flat faces and cuts stay where they are, whichever way they look.

@@ -8,11 +8,14 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
+import manifold3d
 import numpy as np
+from scipy.spatial import ConvexHull
+from shapely import MultiPoint, Point
 
 from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.importers.cad.pieces.corners import corners_of, extremes, is_thick, without_near
-from apo_bench.importers.cad.solids.raw_solid import SAME_CORNER_MM, Region
+from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
@@ -30,8 +33,6 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> l
     Args:
         most: Pieces that are allowed.
     """
-    import manifold3d
-
     parts = [manifold3d.Manifold.hull_points(corners)]
     bores = [bore for bore in bores if _meets(parts[0], bore)]
     if not bores:
@@ -67,8 +68,6 @@ def _between(a: Region, b: Region) -> tuple[Array, float] | None:
 
 def _meets(part: Any, bore: Region) -> bool:
     """Whether a part, seen along the axis of a hole, comes near to the hole."""
-    from shapely import MultiPoint, Point
-
     if part.is_empty():
         return False
     low, high = np.array(part.bounding_box()).reshape(2, 3)
@@ -109,8 +108,6 @@ def _around(part: Any, bore: Region) -> Iterator[Any]:
 
 def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
     """A piece with as many corners on a shaft as its wall needs: new ones on whole circles, more on other ones."""
-    from scipy.spatial import ConvexHull
-
     added = []
     dropped = np.zeros(len(corners), dtype=bool)
     for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):

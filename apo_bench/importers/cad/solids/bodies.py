@@ -2,9 +2,10 @@
 
 from typing import Any
 
+import manifold3d
 import numpy as np
 
-from apo_bench.importers.cad.solids.raw_solid import Mesh
+from apo_bench.importers.cad.solids.mesh import Mesh
 
 _FLAT = 1e-6
 """Corners this near to a flat piece, in parts of the size, are left out of it."""
@@ -12,8 +13,6 @@ _FLAT = 1e-6
 
 def body_of(mesh: Mesh) -> Any:
     """Of manifold3d."""
-    import manifold3d
-
     # Copies, as it takes no arrays that are only to be read.
     corners = np.array(mesh.corners, order="C")
     return manifold3d.Manifold(manifold3d.Mesh64(corners, np.array(mesh.triangles, dtype=np.uint64, order="C")))

@@ -1,4 +1,4 @@
-"""Names of faces: from what they are and where, so that one file gives the same ones each time."""
+"""Names of faces and parts of CAD files, the same for one file each time."""
 
 from collections import Counter
 from collections.abc import Container, Mapping, Sequence
@@ -9,37 +9,38 @@ from unicodedata import combining, normalize
 import numpy as np
 
 from apo_bench.errors import require, require_known
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region
+from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids.region import Region
 from apo_bench.io import clean
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
 _LONGEST_PART_NAME = 48
 _LONGEST_TITLE = 200
 _GRID = 1e-4
-"""Places that differ by less, in parts of the size, are in the order of the other ones."""
+"""Positions are compared on this grid, in parts of the size, which hides rounding."""
 
 
-def with_names(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
-    """Regions with names: `pz`, the outermost face that looks along +z, `pz2` ..., `flat1`, `hole1`, `shaft1`, `cone1`.
+def name_regions(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
+    """Name regions: `pz`, the outermost face along +z, `pz2` ..., `flat1`, `hole1`, `shaft1`, `cone1`.
 
-    Of one kind the outermost one comes first, then by place; of round ones the widest. Faces on free surfaces and
-    walls that do not go all the way round have none.
+    Of one kind the outermost one comes first, of round ones the widest, then by place. Free surfaces and walls that do
+    not go all the way round have no name.
     """
-    by_stem: dict[str, list[int]] = {}
-    for k, region in enumerate(regions):
-        by_stem.setdefault(_stem(region), []).append(k)
-    by_stem.pop("", None)
+    stems = [_stem(region) for region in regions]
+    numbers = Counter[str]()
     named = list(regions)
-    for stem, members in by_stem.items():
-        members.sort(key=lambda k: _order(mesh, regions[k]))
-        for number, k in enumerate(members, start=1):
-            is_outermost_side = len(stem) == 2 and number == 1
-            named[k] = replace(regions[k], name=stem if is_outermost_side else f"{stem}{number}")
+    for k in sorted(range(len(regions)), key=lambda k: _order(mesh, regions[k])):
+        stem = stems[k]
+        numbers[stem] += 1
+        is_outermost_side = len(stem) == 2 and numbers[stem] == 1
+        name = stem if is_outermost_side or not stem else f"{stem}{numbers[stem]}"
+        named[k] = replace(regions[k], name=name)
     return tuple(named)
 
 
-def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
-    """With other names for some faces; `+z` stands for `pz`, `-z` for `nz`.
+def rename_faces(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
+    """Rename some faces; `+z` stands for `pz`, `-z` for `nz`.
 
     Raises:
         InputError: No face has the name, or two would have one.
@@ -52,48 +53,47 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
         require_known("face", old, have)
         is_name = FACE_OR_PART_NAME.fullmatch(new) and len(new) <= LONGEST_FACE_NAME and not new.startswith("auto_")
         require(is_name, f"--name {old}={new} was given; the new name of a face is {rule}.")
-    after = Counter(new_names.get(name, name) for name in have)
-    twice = [name for name, count in after.items() if count > 1]
-    require(not twice, f"--name gives two faces the name {', '.join(twice)}; give each its own.")
+    after = [new_names.get(name, name) for name in have]
+    require(len(set(after)) == len(after), "--name gives two faces one name; give each its own.")
     regions = (replace(region, name=new_names.get(region.name, region.name)) for region in raw.regions)
     return replace(raw, regions=tuple(regions))
 
 
 def part_name(text: str, used: Container[str]) -> str:
-    """A name that a part may have, from any text, and that nothing else has.
+    """Return an unused name that a part may have, from any text.
 
     Letters with accents become plain ones. A text with letters that have no Latin form gives `part_1`, `part_2`, ...
     """
-    plain = _in_latin(text)
-    if plain is None:
+    plain = _latin(text)
+    if not plain.strip("_"):
         return next(free for free in (f"part_{n}" for n in count(1)) if free not in used)
     return free_name(plain if plain[:1].isalpha() else f"part_{plain}", used)
 
 
-def _in_latin(text: str) -> str | None:
-    """A text in letters, digits and underscores; None if a letter has no Latin form, or no letter or digit is left."""
+def _latin(text: str) -> str:
+    """A text in letters, digits and underscores; empty if a letter has no Latin form."""
     plain = ""
     for c in normalize("NFKD", text):
         folded = c if c.isascii() else c.casefold()
         if not folded.isascii() and c.isalnum():
-            return None
+            return ""
         if not combining(c):
             plain += "".join(each if each.isascii() and each.isalnum() else "_" for each in folded)
-    return plain[:_LONGEST_PART_NAME] if plain.strip("_") else None
+    return plain[:_LONGEST_PART_NAME]
 
 
-def title_of(text: str) -> str:
-    """A name of a CAD file as one line that can be printed."""
+def clean_title(text: str) -> str:
+    """Return a name of a CAD file as one line that can be printed."""
     return clean(text)[:_LONGEST_TITLE]
 
 
 def free_name(name: str, used: Container[str]) -> str:
-    """The name, or with a number behind it that makes it one that nothing else has."""
+    """Return the name, or the first unused one with a number behind it."""
     return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
 def _stem(region: Region) -> str:
-    """What a name begins with; empty for what has none."""
+    """The beginning of a name; empty for a region without one."""
     if region.kind == "plane":
         axis = int(np.abs(region.direction).argmax())
         side = ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
@@ -103,7 +103,7 @@ def _stem(region: Region) -> str:
 
 
 def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
-    """How far out a plane is, or how wide a wall, then its lowest corner; on a grid that hides rounding."""
+    """How far out a plane is, or how wide a wall, then its lowest corner."""
     low = mesh.corners[np.unique(mesh.triangles[region.triangles])].min(axis=0)
     first = float(region.direction @ region.point) if region.kind == "plane" else max(region.radii)
     grid = _GRID * mesh.extent

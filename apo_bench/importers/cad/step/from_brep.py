@@ -5,14 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
 from apo_bench.importers.cad.meshes.joining import SAME_CORNER, join_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
-from apo_bench.importers.cad.solids.naming import with_names
-from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together
+from apo_bench.importers.cad.solids.mesh import Mesh, connected, put_together
+from apo_bench.importers.cad.solids.naming import name_regions
+from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids.region import Region
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same
 
 _LEVEL = 1e-6
@@ -26,12 +29,12 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         InputError: A face of it could not be cut into triangles, or its shell is open.
     """
     is_whole = all(len(face.triangles) for face in solid.faces)
-    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
+    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; correct it where it was drawn.")
     mesh, owner = _mesh(solid.faces)
     check_closed(path, mesh)
     surfaces = [face.surface for face in solid.faces]
-    mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
-    mesh = mesh.flipped() if mended else mesh
+    repairs = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
+    mesh = mesh.flip() if repairs else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
     beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
     pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
@@ -43,8 +46,8 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         residual = max((each.residual for each in members if each is not None), default=0.0)
         region = _region(mesh, np.flatnonzero(owner == g), members[0])
         regions.append(replace(region, residual=max(region.residual, residual)))
-    named = with_names(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
-    return RawSolid(solid.name, mesh, solid.places, mended, named)
+    named = name_regions(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
+    return RawSolid(solid.name, mesh, solid.places, repairs, named)
 
 
 def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
@@ -77,8 +80,6 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
 
     None if its ends are not two level circles, nor one and a tip.
     """
-    from scipy.spatial import ConvexHull
-
     near = _LEVEL * mesh.extent
     every = np.unique(mesh.triangles[triangles])
     every = every[np.isin(every, border_of(mesh, triangles)) | (wall.polar(mesh.corners[every])[1] < near)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.importers.cad.meshes.mesh_file import MOST_CAD_TRIANGLES, CadFile, check_size, read_cad_bytes
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, without_copies
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, merge_copies
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.surfaces import BrepSolid
 
@@ -55,7 +55,7 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
             if len(solids) == 1:
                 raise
             left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
-    return CadFile(own_unit, "stated in the file", tuple(left_out)), without_copies(raws)
+    return CadFile(own_unit, "stated in the file", tuple(left_out)), merge_copies(raws)
 
 
 def _read_solids(path: Path) -> list[BrepSolid]:

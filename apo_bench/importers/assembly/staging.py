@@ -1,9 +1,10 @@
-"""How parts stand on the table, and where they wait beside the assembly: in reach, with room for fingers between."""
+"""Where parts stand on the table before they are assembled: in reach, with room for fingers between them."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from shapely import MultiPoint, Point
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
@@ -43,10 +44,8 @@ class Stance(NamedTuple):
     """It lies on a round wall: nothing but friction keeps it in its place."""
 
 
-def stance(solid: Solid, R: Array) -> Stance:
+def find_stance(solid: Solid, R: Array) -> Stance:
     """How a solid stands that is turned like this, (3, 3)."""
-    from shapely import MultiPoint, Point
-
     up = R[2]
     low = extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
@@ -63,8 +62,6 @@ def stance(solid: Solid, R: Array) -> Stance:
 
 def is_carried(base: Array, middle: Array, height_m: float) -> bool:
     """Whether a centre of mass is above the area that carries, (k, 2), with a margin that grows with its height."""
-    from shapely import MultiPoint, Point
-
     carrier = MultiPoint(base).convex_hull
     at = Point(middle[:2])
     is_above = carrier.geom_type == "Polygon" and carrier.contains(at)
@@ -80,7 +77,7 @@ def _lowest(piece: Piece, up: Array, low: float) -> Array:
     return np.asarray(corners[corners @ up < low + _LOW_M])
 
 
-def site_of(reach_m: float, is_beside: bool) -> Site:
+def choose_site(reach_m: float, is_beside: bool) -> Site:
     """A place for an assembly that reaches so far from its middle.
 
     Args:
@@ -93,16 +90,16 @@ def site_of(reach_m: float, is_beside: bool) -> Site:
     return Site((0.1, 0.0), (x, y), (-yaw, yaw))
 
 
-def reach_of(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) -> float:
+def find_reach(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) -> float:
     """How far parts reach from the origin over the table, [m]."""
     boxes = [_box(solids[part], poses[part][:3, :3]) + poses[part][:2, 3] for part in parts]
     return max((float(np.hypot(*np.abs(box).max(axis=0))) for box in boxes), default=0.0)
 
 
-def laid_out(
+def stage_parts(
     solids: Mapping[str, Solid], turns: Mapping[str, Array], kept_free: Sequence[tuple[Array, float]]
 ) -> Mapping[str, Array]:
-    """Where each part waits, (2,), of its frame, [m], the largest first.
+    """Return where the frame of each part starts, (2,), [m]; the largest part is placed first.
 
     Args:
         turns: Part -> its orientation, (3, 3).
@@ -113,8 +110,17 @@ def laid_out(
     """
     boxes = {part: _box(solids[part], R) for part, R in turns.items()}
     for room in _ROOMS_M:
-        places = _with_room(boxes, kept_free, room)
-        if places is not None:
+        places: dict[str, Array] = {}
+        taken: list[tuple[Array, Array]] = []
+        for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
+            low, high = boxes[part]
+            half = (high - low) / 2
+            middle = next((at for at in _grid() if _is_free(at, half, taken, kept_free, room)), None)
+            if middle is None:
+                break
+            taken.append((middle, half))
+            places[part] = np.round(middle - (low + high) / 2, 4)
+        if len(places) == len(boxes):
             return places
     raise InputError(
         f"there is no room for {len(turns)} parts to wait on the table in reach of the arm; assemble fewer or smaller "
@@ -122,31 +128,17 @@ def laid_out(
     )
 
 
-def _with_room(
-    boxes: Mapping[str, Array], kept_free: Sequence[tuple[Array, float]], room: float
-) -> Mapping[str, Array] | None:
-    places: dict[str, Array] = {}
-    taken = list[tuple[Array, Array]]()
-    for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
-        # The first place on the grid at which its box is clear of the others, and of the discs: of a disc, the point of
-        # the box that is nearest to its middle is.
-        low, high = boxes[part]
-        half = (high - low) / 2
-        # Two boxes, each from one corner to the other, are apart if they are so along one axis.
-        middle = next(
-            (
-                at
-                for at in _grid()
-                if all(((at - half > b + room) | (a > at + half + room)).any() for a, b in taken)
-                and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
-            ),
-            None,
-        )
-        if middle is None:
-            return None
-        taken.append((middle - half, middle + half))
-        places[part] = np.round(middle - (low + high) / 2, 4)
-    return places
+def _is_free(
+    at: Array,
+    half: Array,
+    taken: Sequence[tuple[Array, Array]],
+    kept_free: Sequence[tuple[Array, float]],
+    room: float,
+) -> bool:
+    """Whether a box with its middle at a place is clear of other boxes, middle and half sizes, and of discs."""
+    is_apart = all((np.abs(at - middle) > half + other + room).any() for middle, other in taken)
+    # The point of the box that is nearest to the middle of a disc is outside of it.
+    return is_apart and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
 
 
 def _grid() -> Array:

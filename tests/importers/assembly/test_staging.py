@@ -10,12 +10,12 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import Box, Cylinder, Solid, cylinder_hull, pose
-from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
-from apo_bench.importers.assembly.waiting import Stance, laid_out, site_of, stance
+from apo_bench.importers.assembly.staging import Stance, choose_site, find_stance, stage_parts
 from apo_bench.importers.assembly.writing import scenario_text
 from apo_bench.scenario.parts.making import extrude, rectangle, shaft
-from tests.importers.assembly.test_draft import at, made
+from tests.importers.assembly.test_new_scenario import at, made
 
 
 def brick(x: float, y: float, z: float, centroid: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Solid:
@@ -26,7 +26,7 @@ def brick(x: float, y: float, z: float, centroid: tuple[float, float, float] = (
 def test_parts_wait_in_reach_with_room_for_fingers_and_clear_of_the_site() -> None:
     half = np.array([0.02, 0.03])
     solids = {name: brick(*half, 0.01) for name in "abcdef"}
-    places = laid_out(solids, dict.fromkeys(solids, np.eye(3)), [(np.array([0.1, 0.0]), 0.12)])
+    places = stage_parts(solids, dict.fromkeys(solids, np.eye(3)), [(np.array([0.1, 0.0]), 0.12)])
     for a, b in combinations(places.values(), 2):
         assert (np.abs(a - b) - 2 * half).max() > 0.03 - 1e-9, "fingers have room between any two"
     for at_m in places.values():
@@ -37,7 +37,7 @@ def test_parts_wait_in_reach_with_room_for_fingers_and_clear_of_the_site() -> No
 
 def test_the_largest_part_waits_first_nearest_to_where_parts_are_liked() -> None:
     solids = {"small": brick(0.01, 0.01, 0.01), "large": brick(0.03, 0.03, 0.01)}
-    places = laid_out(solids, dict.fromkeys(solids, np.eye(3)), [])
+    places = stage_parts(solids, dict.fromkeys(solids, np.eye(3)), [])
     liked = {name: np.hypot(at_m[0] - 0.05, abs(at_m[1]) - 0.27) for name, at_m in places.items()}
     assert liked["large"] < 0.01
     assert liked["large"] <= liked["small"]
@@ -46,31 +46,31 @@ def test_the_largest_part_waits_first_nearest_to_where_parts_are_liked() -> None
 def test_more_than_the_table_holds_is_refused() -> None:
     solids = {f"p{k}": brick(0.08, 0.08, 0.01) for k in range(12)}
     with pytest.raises(InputError, match="no room for 12 parts to wait on the table"):
-        laid_out(solids, dict.fromkeys(solids, np.eye(3)), [])
+        stage_parts(solids, dict.fromkeys(solids, np.eye(3)), [])
 
 
 def test_a_small_assembly_is_moved_far_and_a_large_one_hardly() -> None:
-    small = site_of(0.03, False)
+    small = choose_site(0.03, False)
     assert small.spread_m == (0.04, 0.06)
     assert np.degrees(small.yaw_rad) == pytest.approx((-28.0, 28.0))
-    assert site_of(0.20, False).spread_m == (0.005, 0.005)
-    assert site_of(0.11, False).spread_m == (0.02, 0.05)
-    beside = site_of(0.03, True)
+    assert choose_site(0.20, False).spread_m == (0.005, 0.005)
+    assert choose_site(0.11, False).spread_m == (0.02, 0.05)
+    beside = choose_site(0.03, True)
     assert beside.spread_m == (0.01, 0.02)
     assert np.degrees(beside.yaw_rad) == pytest.approx((-8.0, 8.0))
 
 
 def test_what_is_heavy_beside_its_foot_does_not_stand() -> None:
-    assert stance(brick(0.02, 0.02, 0.05), np.eye(3)) == (0.05, True, False)
-    assert not stance(brick(0.02, 0.02, 0.05, (0.021, 0.0, 0.0)), np.eye(3)).stands
-    assert not stance(brick(0.02, 0.02, 0.05, (0.017, 0.0, 0.05)), np.eye(3)).stands, "within 4 % of its height"
-    assert stance(brick(0.02, 0.02, 0.05, (0.0155, 0.0, 0.05)), np.eye(3)).stands
+    assert find_stance(brick(0.02, 0.02, 0.05), np.eye(3)) == (0.05, True, False)
+    assert not find_stance(brick(0.02, 0.02, 0.05, (0.021, 0.0, 0.0)), np.eye(3)).stands
+    assert not find_stance(brick(0.02, 0.02, 0.05, (0.017, 0.0, 0.05)), np.eye(3)).stands, "within 4 % of its height"
+    assert find_stance(brick(0.02, 0.02, 0.05, (0.0155, 0.0, 0.05)), np.eye(3)).stands
 
 
 def test_a_cylinder_that_lies_stands_only_where_its_middle_is_over_its_line() -> None:
     def lying(x: float) -> Stance:
         hull = cylinder_hull("p1", Cylinder(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.01, 0.03))
-        return stance(Solid("rod", {}, (hull,), np.array([x, 0.0, 0.0]), 1e-5), np.eye(3))
+        return find_stance(Solid("rod", {}, (hull,), np.array([x, 0.0, 0.0]), 1e-5), np.eye(3))
 
     assert lying(0.02) == (pytest.approx(0.01), True, True)
     assert lying(0.04) == (pytest.approx(0.01), False, False)
@@ -81,14 +81,14 @@ def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) ->
     lid = extrude(rectangle(110, 110), 0, 30, bottom="bottom", top="top")
     rod = shaft(6, 0, 50, "side", bottom="tip", top="head")
     places = {"slab": ("slab", at(0, 0, 0)), "lid": ("lid", at(0, 0, 30)), "rod": ("rod", at(0, 25, 66, 90, 0, 0))}
-    result = draft(on_the_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
+    result = new_scenario(on_the_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
     assert "'rod' lies on a round wall at its start and may roll" in result.notes
     assert any(
         note.startswith("'lid', 110 x 110 x 30 mm as it stands, offers no place to a gripper") for note in result.notes
     )
     text = scenario_text(result, 'a "title"', "a test", tmp_path / "own.toml")
     assert 'title = "a \\"title\\""' in text
-    assert "# as in the assembly; it may roll" in text
+    assert "# NOTE: 'rod' lies on a round wall at its start and may roll." in text
     assert "# NO PLACE for the gripper" in text
 
 
@@ -97,7 +97,7 @@ def test_a_contact_that_no_poses_close_with_the_others_is_left_out_and_said(tmp_
     beam = extrude(rectangle(120, 20), 0, 15, bottom="bottom", top="top")
     places = {name: ("foot", at(x, 0, z)) for name, x, z in (("a", -40, 0), ("b", 0, 0), ("c", 40, -0.03))}
     parts = made(tmp_path, {"foot": foot, "beam": beam}, {**places, "beam": ("beam", at(0, 0, 20))})
-    result = draft(on_the_table(parts), tuple(places))
+    result = new_scenario(on_the_table(parts), tuple(places))
     left_out = [note for note in result.notes if "beam" in note and "not exactly where the other" in note]
     assert len(left_out) == 1
     assert "c.top" in left_out[0]
@@ -123,7 +123,7 @@ def test_the_assembly_stands_on_the_table_whichever_axis_looks_up(tmp_path: Path
         ('[[pose]]\npart = "block"\nat_mm = [0, 0, 0]\n', "1 poses were given; 2 to 49 parts make an assembly"),
         (2 * '[[pose]]\npart = "block"\nname = "2 b"\nat_mm = [0, 0, 0]\n', r"matching regex .*pose\[0\]\.name"),
         (2 * '[[pose]]\npart = "block"\nat_mm = [0, 0]\n', "at_mm"),
-        (2 * '[[pose]]\npart = "uncorrected"\nat_mm = [0, 0, 0]\n', "none.xml"),
+        (2 * '[[pose]]\npart = "none"\nat_mm = [0, 0, 0]\n', "none.xml"),
     ],
 )
 def test_a_file_of_poses_that_makes_no_assembly_is_refused(text: str, sentence: str, tmp_path: Path) -> None:

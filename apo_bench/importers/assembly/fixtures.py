@@ -1,27 +1,23 @@
-"""A nest for a part that does not stand as it will be put: columns that follow it from below, walls where that is not
-enough. It is lifted straight out of it, and needs no turning over.
-"""
+"""Fixtures for parts that do not stand as they will be put: columns below, and walls where these are not enough."""
 
 from collections.abc import Sequence
 from itertools import groupby, pairwise
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from apo_bench.geometry import Array, Box, Solid, all_corners, intrusion_depths, passage
-from apo_bench.importers.assembly.waiting import is_carried
+from apo_bench.importers.assembly.staging import is_carried
 from apo_bench.scenario.parts.allowed import THINNEST_M
 
 FLOOR_M = 0.002
-RAISED_M = 0.04
-"""How far over the table the lowest point of a part in its nest is; and where a tilted hand needs room below."""
+"""The height of the lowest point of a part in its fixture over the table."""
 _CELL_M = 0.004
 _MOST = 9
 """Columns are about so wide, and at most so many each way."""
 _BESIDE_M = 0.0025
 """Columns end so far inside of the box around the part, for fingers beside it."""
-_LOOKS = 3
+_RAYS = 3
 """Rays each way by which the height of a column is found."""
 _INSET_M = 1e-6
 _BELOW_M = 1e-5
@@ -34,23 +30,23 @@ _HIGHEST_M = 0.02
 """Walls are so thick, so far from the part, and so high: a part of its height, but no higher than this."""
 
 
-def nest_of(name: str, solid: Solid, R: Array, floor_m: float = FLOOR_M) -> Solid:
-    """The nest of a solid that is turned like this, (3, 3): boxes along the axes of the world, over the table.
+def make_fixture(name: str, solid: Solid, R: Array) -> Solid:
+    """Return the fixture of a solid with an orientation, (3, 3): boxes along the axes of the world, over the table.
 
-    Its frame is right below that of the solid, on the table; that of the solid is so much higher than if it lay there.
+    Its frame is right below that of the solid, on the table; the solid stands higher by `FLOOR_M` than on the table.
     """
     corners = all_corners(solid.pieces)[0] @ R.T
     low, high = corners.min(axis=0), corners.max(axis=0)
-    rise = floor_m - low[2]
+    rise = FLOOR_M - low[2]
     T = np.eye(4)
     T[:3] = np.column_stack([R, [0.0, 0.0, rise]])
     inset = np.minimum(_BESIDE_M, (high - low)[:2] / 4)
-    fitted = [_fitted(each, solid, T) for each in _columns(solid, R, rise, low[:2] + inset, high[:2] - inset)]
+    fitted = [_fit_height(each, solid, T) for each in _columns(solid, R, rise, low[:2] + inset, high[:2] - inset)]
     feet = np.concatenate([np.zeros((0, 2)), *((b.center + _CORNERS * b.half)[:, :2] for b in fitted if b.half[2] > 0)])
     middle = R @ solid.centroid
-    walls = [] if is_carried(feet, middle, float(middle[2] - low[2])) else _walls(low, high, floor_m)
+    walls = [] if is_carried(feet, middle, float(middle[2] - low[2])) else _walls(low, high)
     beside = _WALL_M if walls else -inset
-    plate = _upright((*(low[:2] - beside), 0.0), (*(high[:2] + beside), floor_m - _BELOW_M))
+    plate = _box_between((*(low[:2] - beside), 0.0), (*(high[:2] + beside), FLOOR_M - _BELOW_M))
     columns = [box for box in fitted if box.half[2] > plate.half[2] + _INSET_M and box.half.min() > THINNEST_M]
     boxes = tuple(Box(f"p{i}", b.center, b.half) for i, b in enumerate((plate, *columns, *walls), start=1))
     return Solid(name=name, faces={}, pieces=boxes, centroid=np.zeros(3), volume=1.0)
@@ -66,32 +62,32 @@ def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> li
         for top, alike in groupby(range(len(tops)), key=lambda i: round(tops[i], 6)):
             run = list(alike)
             if np.isfinite(top):
-                boxes.append(_upright((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
+                boxes.append(_box_between((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
     return boxes
 
 
 def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple[float, float]) -> float:
     """How high the lowest point of a turned solid is above a rectangle, [m]; infinite where there is none."""
-    sides = [np.linspace(a + _INSET_M, b - _INSET_M, _LOOKS) for a, b in zip(begin, end, strict=True)]
-    grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_LOOKS**2)], axis=1)
+    sides = [np.linspace(a + _INSET_M, b - _INSET_M, _RAYS) for a, b in zip(begin, end, strict=True)]
+    grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_RAYS**2)], axis=1)
     return min(float(passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
 
 
-def _fitted(box: Box, solid: Solid, T: Array) -> Box:
+def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
     """A column as high as the solid at T leaves it room; of no height if that is not found soon."""
+    low = (box.center - box.half)[:2]
+    high = (box.center + box.half)[:2]
     for _ in range(3):
         depth = float(intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
         if depth <= 0.0:
             return box
-        box = _upright(
-            (*(box.center - box.half)[:2], 0.0), (*(box.center + box.half)[:2], 2 * max(0.0, box.half[2] - depth))
-        )
-    return _upright((*(box.center - box.half)[:2], 0.0), (*(box.center + box.half)[:2], 0.0))
+        box = _box_between((*low, 0.0), (*high, 2 * max(0.0, box.half[2] - depth)))
+    return _box_between((*low, 0.0), (*high, 0.0))
 
 
-def _walls(low: Array, high: Array, floor_m: float) -> list[Box]:
+def _walls(low: Array, high: Array) -> list[Box]:
     """Four walls around a box, on the table."""
-    top = floor_m + min(_WALLED * (high[2] - low[2]), _HIGHEST_M)
+    top = FLOOR_M + min(_WALLED * (high[2] - low[2]), _HIGHEST_M)
     middle, reach = (low + high)[:2] / 2, (high - low)[:2] / 2 + _PLAY_M
     boxes = []
     for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):
@@ -103,27 +99,29 @@ def _walls(low: Array, high: Array, floor_m: float) -> list[Box]:
     return boxes
 
 
-def _upright(low: Sequence[float], high: Sequence[float]) -> Box:
+def _box_between(low: Sequence[float], high: Sequence[float]) -> Box:
     """The box from its lowest corner to its highest."""
     return Box("", np.add(low, high) / 2, np.subtract(high, low) / 2)
 
 
-def nest_xml(nest: Solid) -> str:
-    """The part file."""
-
-    def words(values: Any) -> str:
-        return " ".join(f"{float(x):.9g}" for x in values)
-
-    geoms = [f'      <geom name="{b.name}" pos="{words(b.center)}" size="{words(b.half)}"/>' for b in nest.pieces]
+def fixture_xml(fixture: Solid) -> str:
+    """Return the part file."""
+    geoms = [
+        f'      <geom name="{b.name}" pos="{_numbers(b.center)}" size="{_numbers(b.half)}"/>' for b in fixture.pieces
+    ]
     return "\n".join(
         [
-            f"<mujoco model={quoteattr(nest.name)}>",
+            f"<mujoco model={quoteattr(fixture.name)}>",
             '  <default><geom type="box" density="600" friction="0.3 0.005 0.0001" rgba="0.55 0.6 0.65 1"/></default>',
             "  <worldbody>",
-            f"    <body name={quoteattr(nest.name)}>",
+            f"    <body name={quoteattr(fixture.name)}>",
             *geoms,
             "    </body>",
             "  </worldbody>",
             "</mujoco>\n",
         ]
     )
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{float(x):.9g}" for x in values)

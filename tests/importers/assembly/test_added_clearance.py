@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +9,14 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import Solid, intrusion, physical_pieces
-from apo_bench.importers.assembly.loosening import filled, loosened
+from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.posed import PosedPart
-from apo_bench.importers.assembly.upright import drafted
+from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import scenario_text, write_scenario
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.fit import with_fit
-from apo_bench.scenario.parts.making import bore, extrude, join, polygon, rectangle, shaft, write_part
+from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft, write_part
 from tests.importers.assembly.test_blocked import FLOOR, made
 
 SLOTTED = join(FLOOR, *(extrude(rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
@@ -37,13 +36,13 @@ def width(solid: Solid, clearance_mm: float = 0.0) -> float:
 @pytest.mark.parametrize("over", [0.0, 0.02, 0.1])
 def test_a_tongue_as_wide_as_its_slot_or_wider_gets_play_that_the_file_states(tmp_path: Path, over: float) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
-    (_, tongue), (note,) = loosened(parts, 0.25)
+    (_, tongue), (note,) = add_clearance(parts, 0.25)
     assert sorted(tongue.fit.values()) == pytest.approx([over, over], abs=1e-5)
     assert width(tongue.solid) == pytest.approx(20.0, abs=1e-4)
     assert width(tongue.solid, 0.25) == pytest.approx(19.5, abs=1e-4)
     assert "as stated under [parts.tongue.fit]" in note
     path = tmp_path / "own.toml"
-    found = drafted(parts)
+    found = new_upright_scenario(parts)
     write_scenario(found, path, "own", "a test")
     assert note in found.notes
     assert f"# NOTE: {note}." in path.read_text(encoding="utf-8")
@@ -59,87 +58,19 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
     tmp_path: Path, over: float, clearance: float, most: float
 ) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
-    assert loosened(parts, clearance, most) == (parts, ())
+    assert add_clearance(parts, clearance, most) == (parts, ())
 
 
 def test_what_has_play_keeps_its_size(tmp_path: Path) -> None:
     parts = slotted(tmp_path, 19.8)
-    assert loosened(parts, 0.25) == (parts, ())
-
-
-@pytest.mark.parametrize("play", [0.06, 0.25, 0.9])
-def test_what_was_drawn_with_play_touches_its_walls_and_is_as_drawn_with_the_clearance(
-    tmp_path: Path, play: float
-) -> None:
-    parts = slotted(tmp_path, 20.0 - 2.0 * play)
-    (base, tongue), clearance, (note,) = filled(parts)
-    assert clearance == pytest.approx(play, abs=1e-3)
-    assert (base, f"{clearance:g} mm of play per side" in note) == (parts[0], True)
-    assert width(tongue.solid) == pytest.approx(20.0, abs=1e-4)
-    found = drafted(parts)
-    path = tmp_path / "own.toml"
-    write_scenario(found, path, "own", "a test")
-    assert note in found.notes
-    scenario = load_scenario(path)
-    assert scenario.clearance_mm == found.clearance_mm == clearance
-    assert len(scenario.assembly.operations[0].contacts) == 3
-    assert width(scenario.assembly.solids["tongue"], clearance) == pytest.approx(20.0 - 2.0 * play, abs=1e-3)
-    assert drafted(parts, clearance_mm=0.25).parts[1].solid is parts[1].solid
-
-
-def test_a_part_between_walls_of_two_others_comes_forward_once(tmp_path: Path) -> None:
-    """Loosening leaves it so."""
-    bar = extrude(rectangle(10, 60, (35, 0)), 35, 50)
-    frame = join(*(extrude(rectangle(50, 20, (15, 20 * s)), 35, 50) for s in (-1, 1)), bar)
-    parts = made(
-        tmp_path,
-        base=(SLOTTED, (0, 0, 0)),
-        tongue=(extrude(rectangle(19.5, 19.5), 0, 60), (0, 0, 10)),
-        frame=(frame, (0, 0, 0)),
-    )
-    grown, clearance, notes = filled(parts)
-    assert (clearance, len(notes)) == (0.25, 2)
-    for each in (grown, loosened(grown, 0.25)[0]):
-        solid = each[1].solid
-        corners = 1e3 * np.concatenate([piece.corners for piece in solid.pieces])
-        assert np.ptp(corners[:, :2], axis=0) == pytest.approx([20.0, 20.0], abs=1e-4)
-        assert width(solid, 0.25) == pytest.approx(19.5, abs=1e-4)
-
-
-def test_play_that_differs_or_is_on_one_side_stays_as_it_was_drawn(tmp_path: Path) -> None:
-    aside = slotted(tmp_path, 19.5)
-    moved = replace(aside[1], T=aside[1].T + np.eye(4, k=3) * 1e-4)
-    assert filled((aside[0], moved))[1:] == (None, ())
-    wide = slotted(tmp_path, 17.0)
-    assert filled(wide) == (wide, None, ())
-    (tmp_path / "two").mkdir()
-    both = made(
-        tmp_path / "two",
-        base=(SLOTTED, (0, 0, 0)),
-        tight=(extrude(rectangle(19.4, 18), 0, 35), (0, -12, 10)),
-        loose=(extrude(rectangle(18.6, 18), 0, 35), (0, 12, 10)),
-    )
-    assert filled(both) == (both, None, ())
-
-
-def test_what_would_come_forward_into_a_third_part_stays(tmp_path: Path) -> None:
-    """A wedge whose edge is as near to the side of the tongue as the walls are."""
-    wedge = extrude(polygon((9.8, 0), (20, -10), (20, 10)), 40, 50)
-    parts = made(
-        tmp_path,
-        base=(SLOTTED, (0, 0, 0)),
-        tongue=(extrude(rectangle(19.4, 20), 0, 60, bottom="foot"), (0, -5, 10)),
-        wedge=(wedge, (0, 0, 0)),
-    )
-    assert filled(parts[:2])[1] is not None
-    assert filled(parts)[1:] == (None, ())
+    assert add_clearance(parts, 0.25) == (parts, ())
 
 
 @pytest.mark.parametrize("over", [0.0, 0.05])
 def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
     plate = extrude(rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
     parts = made(tmp_path, plate=(plate, (0, 0, 0)), pin=(shaft(4.0 + over, 0, 30, "pin"), (0, 0, 0)))
-    (_, pin), _ = loosened(parts, 0.25)
+    (_, pin), _ = add_clearance(parts, 0.25)
     assert pin.fit == {"pin": pytest.approx(over, abs=1e-5)}
     assert pin.solid.rounds["pin"].radius == pytest.approx(4e-3, abs=1e-8)
     assert intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
@@ -165,7 +96,7 @@ def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
 def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
     parts = slotted(tmp_path, 20.0)
     path = tmp_path / "own.toml"
-    text = scenario_text(drafted(parts), "own", "a test", path)
+    text = scenario_text(new_upright_scenario(parts), "own", "a test", path)
     head, tail = text.split("\n[parts.tongue.fit]")
     path.write_text(head + "\n[parts.tongue.fit]\n" + fit + "\n\n" + tail.split("\n\n", 1)[1], encoding="utf-8")
     with pytest.raises(InputError, match=said):

@@ -11,10 +11,10 @@ from apo_bench import InputError, Scenario, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.checking import line_of
-from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
-from apo_bench.importers.assembly.touching import clashes
-from apo_bench.importers.assembly.waiting import stance
+from apo_bench.importers.assembly.staging import find_stance
+from apo_bench.importers.assembly.touching import find_clashes
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import Body, bore, circle, extrude, join, polygon, rectangle, shaft, write_part
@@ -54,7 +54,7 @@ def covered(folder: Path, off_mm: float) -> tuple[PosedPart, ...]:
 
 def loaded(parts: tuple[PosedPart, ...], folder: Path, *fixed: str) -> Scenario:
     path = folder / "own.toml"
-    write_scenario(draft(on_the_table(parts), fixed), path, "own", "a test")
+    write_scenario(new_scenario(on_the_table(parts), fixed), path, "own", "a test")
     return load_scenario(path)
 
 
@@ -79,23 +79,10 @@ def test_contacts_order_and_starts_are_found_and_poses_closed(tmp_path: Path) ->
 def test_the_order_is_as_asked_where_that_can_be(tmp_path: Path) -> None:
     parts = on_the_table(covered(tmp_path, off_mm=0.0))
     for asked in (("pin_1", "pin_2", "cover"), ("pin_2", "pin_1", "cover")):
-        assert tuple(placing.moves[0] for placing in draft(parts, asked=asked).order) == asked
+        assert tuple(placing.moves[0] for placing in new_scenario(parts, wanted_order=asked).order) == asked
     for wrong in (("pin_1", "cover"), ("pin_1", "pin_2", "lid")):
         with pytest.raises(InputError, match=r"in the order .* cannot be put together; .*cover.* can be"):
-            draft(parts, asked=wrong)
-
-
-def test_flat_walls_that_were_drawn_with_play_are_named(tmp_path: Path) -> None:
-    floor = extrude(rectangle(80, 60), 0, 10)
-    walls = [extrude(rectangle(80, 10, (0, side)), 10, 20) for side in (-15.2, 15.2)]
-    parts = made(
-        tmp_path,
-        {"channel": join(floor, *walls), "block": extrude(rectangle(30, 20), 0, 30)},
-        {"channel": ("channel", at(0, 0, 0)), "block": ("block", at(0, 0, 10))},
-    )
-    notes = [note for note in draft(on_the_table(parts)).notes if "have play as drawn" in note]
-    assert len(notes) == 1
-    assert "line to line" in notes[0]
+            new_scenario(parts, wanted_order=wrong)
 
 
 def test_what_is_blocked_where_it_goes_is_put_together_beside_the_assembly(tmp_path: Path) -> None:
@@ -130,14 +117,14 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
         {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 0))},
     )
     with pytest.raises(RuntimeError, match="a press fit or a thread"):
-        draft(on_the_table(tight))
+        new_scenario(on_the_table(tight))
     thin = shaft(1.5, 0, 90, "side", bottom="tip", top="head")
     hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
     tall = made(
         tmp_path, {"plate": hole, "thin": thin}, {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     )
-    notes = draft(on_the_table(tall)).notes
-    assert any("'thin' waits in a nest" in note for note in notes)
+    notes = new_scenario(on_the_table(tall)).notes
+    assert any("'thin' starts in a fixture" in note for note in notes)
 
 
 def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: Path) -> None:
@@ -148,7 +135,7 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
         "left": ("cube", at(-15, 0, 10)),
         "right": ("cube", at(15, 0, 10)),
     }
-    found = draft(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
+    found = new_scenario(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
     last = found.grasps[found.order[-1].moves[0]]
     assert last is not None
     assert abs(last.across[1]) == pytest.approx(1.0)
@@ -165,30 +152,15 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
     assert any(
         "stand out higher" in note
-        for note in draft(on_the_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
+        for note in new_scenario(on_the_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
     )
-
-
-def test_a_hand_is_tilted_away_from_a_tower_and_leans_towards_its_arm(tmp_path: Path) -> None:
-    floor = extrude(rectangle(110, 110), 0, 12)
-    tower = extrude(rectangle(20, 110, (-30, 0)), 12, 130)
-    block = extrude(rectangle(18, 18), 0, 30, bottom="bottom", top="top")
-    places = {"base": ("base", at(0, 0, 0)), "block": ("block", at(-9.5, 0, 12))}
-    scenario = loaded(made(tmp_path, {"base": join(floor, tower), "block": block}, places), tmp_path)
-    (grasp,) = scenario.grasps
-    assert grasp.ahead is not None
-    assert abs(grasp.ahead[2]) >= np.cos(np.radians(45.0)) - 1e-9
-    leans = scenario.goals[0][:3, :3] @ grasp.ahead
-    assert leans[0] > 0.2  # the hand is nearer to the arm, which stands at x = -420 mm, than its tips
-    tall = scenario.start["base"][:3, :3] @ np.array([-1.0, 0.0, 0.0])
-    assert tall[0] == pytest.approx(1.0)  # so the assembly was turned
 
 
 def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
     hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 4.3, 12, 20, "bore")], bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "pin": ("pin", at(0, 0, 12))}
     pin = shaft(4, 0, 12, "side", bottom="tip", top="head")
-    found = draft(on_the_table(made(tmp_path, {"base": hole, "pin": pin}, places)))
+    found = new_scenario(on_the_table(made(tmp_path, {"base": hole, "pin": pin}, places)))
     assert not found.notes
     grasp = found.grasps["pin"]
     assert grasp is not None
@@ -202,9 +174,9 @@ def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:
         {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 8))},
     )
     with pytest.raises(RuntimeError, match="nothing is below 'pin'"):
-        draft(on_the_table(beside))
+        new_scenario(on_the_table(beside))
     with pytest.raises(InputError, match="unknown part 'pn'"):
-        draft(on_the_table(beside), ("pn",))
+        new_scenario(on_the_table(beside), ("pn",))
 
 
 def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
@@ -212,17 +184,17 @@ def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     bar = extrude(rectangle(100, 20), 0, 10, bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on base"):
-        draft(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
+        new_scenario(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
 
 
 def test_what_stands_and_what_rolls(tmp_path: Path) -> None:
     write_part("pin", PIN, tmp_path, density=700, source="a test", licence="CC0-1.0")
     pin = load_part(tmp_path / "pin.xml")
-    assert stance(pin, np.eye(3)) == (0.0, True, False)
-    lies = stance(pin, pose.at(np.zeros(3), (90, 0, 0))[:3, :3])
+    assert find_stance(pin, np.eye(3)) == (0.0, True, False)
+    lies = find_stance(pin, pose.at(np.zeros(3), (90, 0, 0))[:3, :3])
     assert lies.rolls
     assert lies.height_m == pytest.approx(0.004, abs=1e-6)
-    assert not stance(pin, pose.at(np.zeros(3), (30, 0, 0))[:3, :3]).stands
+    assert not find_stance(pin, pose.at(np.zeros(3), (30, 0, 0))[:3, :3]).stands
 
 
 def test_lines_of_keys_are_found() -> None:
@@ -266,7 +238,7 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(("deep_mm", "is_loaded"), [(0.01, True), (0.03, False)])
-def test_parts_that_are_as_deep_in_each_other_as_a_draft_allows_are_loaded(
+def test_parts_that_are_as_deep_in_each_other_as_a_new_scenario_allows_are_loaded(
     tmp_path: Path, deep_mm: float, is_loaded: bool
 ) -> None:
     bodies = {
@@ -278,9 +250,9 @@ def test_parts_that_are_as_deep_in_each_other_as_a_draft_allows_are_loaded(
     parts = on_the_table(made(tmp_path, bodies, {name: (name, T) for name, T in places.items()}))
     if not is_loaded:
         with pytest.raises(RuntimeError, match=r"0\.03 mm inside each other"):
-            draft(parts)
+            new_scenario(parts)
         return
-    write_scenario(draft(parts), tmp_path / "own.toml", "own", "a test")
+    write_scenario(new_scenario(parts), tmp_path / "own.toml", "own", "a test")
     assert len(load_scenario(tmp_path / "own.toml").assembly) == 2
 
 
@@ -292,4 +264,4 @@ def test_a_tube_in_a_pit_of_a_boss_is_pressed_into_nothing(tmp_path: Path) -> No
     parts = made(tmp_path, bodies, {name: (name, at(0, 0, 0)) for name in bodies})
     solids = {part.name: part.solid for part in parts}
     assert any(wall.radius == pytest.approx(0.005) for wall in solids["base"].rounds.values())
-    assert clashes(solids, {part.name: part.T for part in parts}, 0.25) == []
+    assert find_clashes(solids, {part.name: part.T for part in parts}, 0.25) == []

@@ -1,4 +1,4 @@
-"""Nests: a part rests in one, is lifted straight out of it, and its file is a part."""
+"""Fixtures: a part rests in one, is lifted straight out of it, and its file is a part."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import Array, Solid, extent, intrusion_depths, pose
-from apo_bench.importers.assembly.nests import FLOOR_M, RAISED_M, nest_of, nest_xml
+from apo_bench.importers.assembly.fixtures import FLOOR_M, fixture_xml, make_fixture
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import extrude, polygon, rectangle, shaft, solid_of
 
@@ -25,36 +25,35 @@ PARTS = {
 }
 
 
-def in_nest(name: str, floor_m: float) -> tuple[Solid, Solid, Array]:
-    """The part, its nest, and the part in the frame of the nest."""
+def in_fixture(name: str) -> tuple[Solid, Solid, Array]:
+    """The part, its fixture, and the part in the frame of the fixture."""
     solid, turn = PARTS[name]
     T = pose.at(np.zeros(3), turn)
-    nest = nest_of("nest", solid, T[:3, :3], floor_m)
-    return solid, nest, pose.at((0.0, 0.0, floor_m - extent(solid.pieces, T[2, :3])[0])) @ T
+    fixture = make_fixture("fixture", solid, T[:3, :3])
+    return solid, fixture, pose.at((0.0, 0.0, FLOOR_M - extent(solid.pieces, T[2, :3])[0])) @ T
 
 
-@pytest.mark.parametrize("floor_m", [FLOOR_M, RAISED_M])
 @pytest.mark.parametrize("name", PARTS)
-def test_a_part_rests_in_its_nest_and_is_lifted_straight_out_of_it(name: str, floor_m: float):
-    solid, nest, T = in_nest(name, floor_m)
+def test_a_part_rests_in_its_fixture_and_is_lifted_straight_out_of_it(name: str):
+    solid, fixture, T = in_fixture(name)
     lifts = np.outer(np.linspace(-2e-5, 0.08, 400), (0.0, 0.0, 1.0))
-    depths = intrusion_depths(solid.pieces, T[:3, :3], T[:3, 3] + lifts, nest.pieces, np.eye(4))
+    depths = intrusion_depths(solid.pieces, T[:3, :3], T[:3, 3] + lifts, fixture.pieces, np.eye(4))
     assert depths[0] > 1e-6  # it would be in it a hair lower
     assert depths[lifts[:, 2] >= 0.0].max() <= 1e-9
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_the_file_of_a_nest_is_a_part(name: str, tmp_path: Path):
-    _, nest, _ = in_nest(name, FLOOR_M)
-    path = tmp_path / "nest.xml"
-    path.write_text(nest_xml(nest), encoding="utf-8")
-    assert len(load_part(path).pieces) == len(nest.pieces)
+def test_the_file_of_a_fixture_is_a_part(name: str, tmp_path: Path):
+    _, fixture, _ = in_fixture(name)
+    path = tmp_path / "fixture.xml"
+    path.write_text(fixture_xml(fixture), encoding="utf-8")
+    assert len(load_part(path).pieces) == len(fixture.pieces)
 
 
 def test_only_what_columns_do_not_carry_stands_between_walls():
-    low, high = (extent(in_nest("blade", FLOOR_M)[1].pieces, np.eye(3)[0])[i] for i in (0, 1))
+    low, high = (extent(in_fixture("blade")[1].pieces, np.eye(3)[0])[i] for i in (0, 1))
     assert high - low == pytest.approx(0.0014 + 2 * 0.00515)
-    solid, nest, T = in_nest("leaning bar", FLOOR_M)
-    inside, whole = extent(nest.pieces, np.eye(3)[0]), extent(solid.pieces, T[0, :3])
+    solid, fixture, T = in_fixture("leaning bar")
+    inside, whole = extent(fixture.pieces, np.eye(3)[0]), extent(solid.pieces, T[0, :3])
     assert whole[0] < inside[0] - 0.002
     assert inside[1] + 0.002 < whole[1]

@@ -1,0 +1,80 @@
+"""Give play to parts that were drawn without any: mating faces of the smaller part recede.
+
+Printed and moulded parts are often drawn line to line, or a little inside each other, and physics finds no way in. So
+faces recede to where they only touch, and by the clearance; those of the larger part do if the smaller one is too thin.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
+from apo_bench.assembly.touching import facing
+from apo_bench.errors import InputError
+from apo_bench.geometry import physical_pieces
+from apo_bench.importers.assembly.posed import PosedPart
+from apo_bench.importers.assembly.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.scenario.parts.fit import with_fit
+
+MOST_OVERLAP_MM = 0.2
+"""Faces that are deeper in each other do not recede."""
+_DIGITS = 5
+
+
+def add_clearance(
+    parts: Sequence[PosedPart], clearance_mm: float, most_mm: float = MOST_OVERLAP_MM
+) -> tuple[tuple[PosedPart, ...], tuple[str, ...]]:
+    """Return the parts, with more faces that fit than their files mark, and a note for each pair of parts.
+
+    Args:
+        clearance_mm: By how much these recede; with none, nothing is changed.
+        most_mm: Faces that are deeper in each other stay where they are; 0: all do.
+    """
+    changed = {each.name: each for each in parts}
+    notes = list[str]()
+    for pair in combinations(parts, 2) if most_mm and clearance_mm else ():
+        wide, thin = sorted(pair, key=lambda each: -each.solid.volume)
+        for own, other in ((thin, wide), (wide, thin)):
+            tight = _tight_faces(own, other, most_mm)
+            before = changed[own.name].fit
+            fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
+            try:
+                solid = with_fit(own.solid, {face: mm for face, mm in fit.items() if face not in own.fit})
+                physical_pieces(solid, 1e-3 * clearance_mm)
+            except InputError as error:
+                notes.append(f"'{own.name}' gets no play in '{other.name}': {str(error).rstrip('.')}")
+                continue
+            if tight:
+                changed[own.name] = replace(own, solid=solid, fit=fit)
+                notes.append(
+                    f"'{own.name}' was drawn without play in '{other.name}': {len(tight)} of its faces recede to where "
+                    f"they touch, and by the clearance, as stated under [parts.{own.name}.fit]; remove them there for "
+                    "a press fit"
+                )
+            break
+    return tuple(changed.values()), tuple(notes)
+
+
+def _tight_faces(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
+    """Faces of the first part that need play, and how deep each of them is in the second one, [mm]."""
+    pairs = facing(own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE)
+    gaps = {Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m for each in pairs}
+    gaps = {contact: gap_m for contact, gap_m in gaps.items() if gap_m < NEAR_M}
+    solids = {own.name: own.solid, other.name: other.solid}
+    walls = walls_without_play(solids, {own.name: own.T, other.name: other.T}, gaps)
+    held = {contact for pair in walls for contact in pair}
+    deep = [(c.manipulated.face, -1e3 * gap) for c, gap in gaps.items() if c in held or gap < -NEAR_M]
+    deep += _tight_shafts(own, other, gaps, most_mm)
+    # Of a face that touches several the deepest comes last.
+    return {face: round(max(0.0, mm), _DIGITS) for face, mm in sorted(deep)}
+
+
+def _tight_shafts(
+    own: PosedPart, other: PosedPart, gaps: Mapping[Contact, float], most_mm: float
+) -> Iterator[tuple[str, float]]:
+    """Shafts that are as thick as the hole around them, or thicker, and the holes of such."""
+    for mine, its in gaps:
+        a, b = own.solid.face(mine.face), other.solid.face(its.face)
+        play_mm = 1e3 * geometric_play(a, b)
+        if contact_kind(a, b) == "shaft in hole" and -most_mm <= play_mm <= NO_PLAY_MM and not (a.fit or b.fit):
+            yield mine.face, -play_mm

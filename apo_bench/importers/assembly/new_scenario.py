@@ -1,0 +1,155 @@
+"""Make a scenario of posed parts: contacts, an order, starts and grasps."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Poses
+from apo_bench.errors import require, require_known
+from apo_bench.geometry import Array, Solid, extent, pose
+from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
+from apo_bench.importers.assembly.grasps import FoundGrasps, find_grasps
+from apo_bench.importers.assembly.ordering import OrderSearch, Placing
+from apo_bench.importers.assembly.posed import TABLE, PosedPart
+from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
+from apo_bench.importers.assembly.touching import close_contacts, find_clashes, find_contacts, walls_without_play
+from apo_bench.importers.cad.solids.naming import free_name
+from apo_bench.scenario.parts import load_part
+from apo_bench.scenario.scenario import Grasp, Site
+
+_LOW_M = 1e-4
+_GROUP_ROOM_M = 0.05
+_FARTHEST_ASIDE_M = 0.26
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class NewScenario:
+    """A scenario, before it is written."""
+
+    parts: tuple[PosedPart, ...]
+    """At the poses at which all contacts are closed."""
+    fixed: tuple[str, ...]
+    why_fixed: str
+    order: tuple[Placing, ...]
+    starts: Mapping[str, Array]
+    """(4, 4), world, [m]; of fixed parts in the frame of the assembly. Of fixtures too."""
+    stances: Mapping[str, Stance]
+    fixtures: Mapping[str, Solid]
+    """Part -> the fixture that carries it at its start, as it does not stand alone."""
+    grasps: Mapping[str, Grasp | None]
+    site: Site
+    clearance_mm: float
+    notes: tuple[str, ...]
+    """For a person, one sentence each."""
+    unfit: tuple[str, ...]
+    """The notes on parts that the robot cannot hold."""
+    up: str = "z"
+    """The axis of the given poses that is up, and why."""
+
+
+class NoOrder(RuntimeError):
+    """Parts cannot be put together one after the other, with this side up."""
+
+
+def new_scenario(
+    parts: Sequence[PosedPart],
+    fixed: Sequence[str] = (),
+    clearance_mm: float = 0.25,
+    wanted_order: Sequence[str] = (),
+) -> NewScenario:
+    """Make a scenario of parts that stand on the table as `on_the_table` puts them.
+
+    Args:
+        fixed: Parts that stay where they are; none: the largest of the lowest.
+        clearance_mm: Room per side of faces that their part files mark as fit.
+        wanted_order: The moved parts in their order; none: any order.
+
+    Raises:
+        InputError: No part has that name, there is no room on the table, or the wanted order is impossible.
+        RuntimeError: Parts are inside each other.
+        NoOrder: There is no order in which they can be put together.
+    """
+    solids = {each.name: each.solid for each in parts}
+    for name in fixed:
+        require_known("part", name, solids)
+    base = tuple(fixed) or lowest(parts)[:1]
+    why_fixed = "as asked" if fixed else "the largest of the lowest"
+    solids |= {TABLE: load_part(TABLE)}
+    poses: Poses = {each.name: each.T for each in parts} | {TABLE: np.eye(4)}
+    clashes = find_clashes(solids, poses, clearance_mm)
+    if clashes:
+        raise RuntimeError("; ".join(clashes) + ".")
+    poses, contacts, dropped = close_contacts(solids, poses, find_contacts(solids, poses), (TABLE, *base))
+    notes = [
+        *(f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped),
+        *(
+            f"'{contact}' and '{opposite}' leave no play between them; state fit = true for its faces"
+            for contact, opposite in walls_without_play(solids, poses, contacts)
+        ),
+    ]
+    reach = find_reach(solids, poses, [each.name for each in parts])
+    aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
+    search = OrderSearch(solids, poses, contacts, aside, wanted_order)
+    order = search.find(frozenset(base))
+    if order is None:
+        raise NoOrder("; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + ".")
+    mains = [placing.moves[0] for placing in order]
+    require(
+        not wanted_order or mains == list(wanted_order),
+        f"in the order {', '.join(wanted_order)} these parts cannot be put together; {', '.join(mains)} can be: name "
+        "every part once that is not fixed, an inner part before the outer one.",
+    )
+    # The site of the assembly is kept free, and of a sub-assembly that is put together beside it.
+    is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
+    site = choose_site(reach, is_beside)
+    middles = [site.center_m, site.center_m + aside[:2]] if is_beside else [site.center_m]
+    kept_free = [(np.array(middle), reach + max(site.spread_m)) for middle in middles]
+    turns = {each.name: poses[each.name][:3, :3] for each in parts if each.name not in base}
+    stances = {part: find_stance(solids[part], R) for part, R in turns.items()}
+    starts = {part: np.array(poses[part]) for part in (*base, *turns)}
+    fixtures = {}
+    for part, at in stage_parts(solids, turns, kept_free).items():
+        starts[part][:3, 3] = (*at, stances[part].height_m)
+        if not stances[part].stands:
+            starts[part][2, 3] += FLOOR_M
+            fixtures[part] = make_fixture(free_name(f"fixture_{part}", solids), solids[part], turns[part])
+            starts[fixtures[part].name] = pose.at((*at, 0.0))
+            notes.append(f"'{part}' starts in a fixture made for it: it does not stand on the table")
+        elif stances[part].rolls:
+            notes.append(f"'{part}' lies on a round wall at its start and may roll")
+    found = find_grasps(solids, poses, starts, fixtures, order, base)
+    unfit = tuple(_unfit(solids, turns, found))
+    return NewScenario(
+        parts=tuple(replace(each, T=poses[each.name]) for each in parts),
+        fixed=base,
+        why_fixed=why_fixed,
+        order=order,
+        starts=starts,
+        stances=stances,
+        fixtures=fixtures,
+        grasps=found.grasps,
+        site=site,
+        clearance_mm=clearance_mm,
+        notes=(*notes, *unfit),
+        unfit=unfit,
+    )
+
+
+def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
+    """Return the parts that lie on the table, the largest first."""
+    low = {each.name: extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
+    lie = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
+    return tuple(each.name for each in sorted(lie, key=lambda each: -each.solid.volume))
+
+
+def _unfit(solids: Mapping[str, Solid], turns: Mapping[str, Array], found: FoundGrasps) -> Iterator[str]:
+    """A note for each part that cannot be held."""
+    for part, R in turns.items():
+        if part in found.crowded:
+            yield f"the gripper has no room to hold '{part}' from above; let it stand out higher, or give it a handle"
+        if found.grasps[part] is None:
+            size = " x ".join(f"{1e3 * np.ptp(extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
+            yield f"'{part}', {size} mm as it stands, offers no place to a gripper from above"

@@ -1,0 +1,108 @@
+"""Refuse a recording that contradicts its scenario: open contacts, or parts that moved without an operation."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array, pose
+from apo_bench.importers.recording.arrangement import Arrange, Arrangement
+from apo_bench.importers.recording.camera_file import CameraFile
+from apo_bench.importers.recording.camera_pose import rest_error
+from apo_bench.importers.recording.log_poses import mirror
+from apo_bench.importers.recording.observed_operation import ObservedOperation
+from apo_bench.importers.recording.ordering import NoOrder, describe_moves
+from apo_bench.importers.recording.rest_intervals import RestIntervals, is_near
+
+_FITS_MM = 20.0
+"""A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
+_BETTER = 0.4
+"""Another convention fits better if it leaves less than this share of the misfit."""
+_FAR = 5.0
+"""A part that moved by more standard deviations did move."""
+
+
+def check_arrangement(
+    arrangement: Arrangement, arrange: Arrange, intervals: RestIntervals, models: Mapping[str, Array], file: str
+) -> None:
+    """Refuse a recording in which contacts are open, and name another convention if that fits better.
+
+    Args:
+        models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; the identity if it is missing.
+    """
+    if arrangement.wrong_mm <= _FITS_MM:
+        return
+    best = min(arrangement.wrong_mm * _BETTER, _FITS_MM)
+    remedy = "check how the log is written in the camera file, and the ids and frames in the objects file"
+    for key, change in _other_conventions():
+        try:
+            wrong = arrange(_change_models(intervals, models, change)).wrong_mm
+        except (NoOrder, np.linalg.LinAlgError):
+            continue
+        if wrong < best:
+            best = wrong
+            remedy = f"state another `{key}` in the camera file, with which all is within {wrong:.1f} mm"
+    solved = arrangement.camera
+    raise InputError(
+        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * arrangement.fit.gap_m:.0f} mm and "
+        f"{np.degrees(arrangement.fit.angle_rad):.0f} deg, known places are missed by up to {solved.off_mm:.0f} mm and "
+        f"{solved.off_deg:.0f} deg); {remedy}."
+    )
+
+
+def _other_conventions() -> Sequence[tuple[str, Callable[[Array], Array]]]:
+    """The keys of the camera file whose value may be another, and how the poses of models change with each."""
+    return (
+        *(("quaternion", partial(_reorder, shift=shift)) for shift in (1, -1)),
+        *(("mirror", partial(np.multiply, mirror(axis))) for axis in "xyz"),
+        ("inverted", pose.inverse),
+    )
+
+
+def _reorder(T: Array, shift: int) -> Array:
+    """The rotation of the same four numbers in the other order."""
+    packed = pose.pack(T)
+    return np.asarray(pose.unpack(np.concatenate([packed[:3], np.roll(packed[3:], shift)])))
+
+
+def _change_models(
+    intervals: RestIntervals, models: Mapping[str, Array], change: Callable[[Array], Array]
+) -> RestIntervals:
+    """The intervals of the same parts with changed poses of their models."""
+    changed = {}
+    for part, known in intervals.items():
+        M = models.get(part, np.eye(4))
+
+        def change_part(T: Array, M: Array = M) -> Array:
+            return change(T @ pose.inverse(M)) @ M
+
+        changed[part] = tuple(interval.change(change_part) for interval in known)
+    return changed
+
+
+def check_moved(
+    intervals: RestIntervals,
+    operations: Sequence[ObservedOperation],
+    camera: CameraFile,
+    assembly: Assembly,
+    file: str,
+) -> None:
+    """Refuse a recording in which a part moved without an operation, by more than errors or an adjustment explain."""
+    unseen = {part for k, each in enumerate(operations) if each.rest is None for part in assembly.operations[k].moves}
+    for k, operation in enumerate(operations):
+        for part, twist in {**operation.carried, **operation.adjusted}.items():
+            means = [rest.mean for interval in intervals[part] for rest in interval.rests]
+            # Of the difference of two rests, each as uncertain as the least certain one.
+            variance = np.max([np.diag(mean.covariance + rest_error(camera, mean)) for mean in means], axis=0)
+            deviations = float(np.abs(twist / np.sqrt(2.0 * variance)).max())
+            if part in unseen or is_near(twist) or deviations <= _FAR:
+                continue
+            raise InputError(
+                f"{file}: '{part}' moved by {1e3 * np.linalg.norm(twist[:3]):.0f} mm and "
+                f"{np.degrees(np.linalg.norm(twist[3:])):.0f} deg during operation {k + 1} "
+                f"('{assembly.operations[k].main}'), which should not move it, {deviations:.0f} standard deviations of "
+                "where it was observed; if it was hidden or flipped by the tracker, leave those poses out, or state "
+                f"when operations ended by --ends (moves in the log: {describe_moves(intervals)})."
+            )

@@ -1,0 +1,41 @@
+"""How far the contacts of an operation are open at given poses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
+from apo_bench.geometry import RoundFace, beside, face_area
+
+
+class ContactFit(NamedTuple):
+    """The worst of some contacts."""
+
+    gap_m: float
+    """From the middle of the smaller face to the plane of the other one and from beside it to it, or between axes."""
+    angle_rad: float
+    """Between the normal of one and the opposite of the other, or between axes."""
+
+    @property
+    def wrong_mm(self) -> float:
+        """A degree counts like a millimetre."""
+        return 1e3 * self.gap_m + float(np.degrees(self.angle_rad))
+
+
+def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
+    """Measure how far the contacts of operation k are open at poses, world, [m]."""
+    fits = [ContactFit(0.0, 0.0), *(_measure(assembly, contact, poses) for contact in assembly.operations[k].contacts)]
+    return ContactFit(max(fit.gap_m for fit in fits), max(fit.angle_rad for fit in fits))
+
+
+def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
+    (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
+    if isinstance(a, RoundFace) or isinstance(b, RoundFace):
+        measured = measure_round(a, T_a, b, T_b)
+        return ContactFit(abs(measured.gap_m), measured.angle_rad)
+    # From the middle of the smaller face: how high above the plane of the larger one, how far beside its outline.
+    if face_area(a) > face_area(b):
+        (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
+    cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))
+    apart = float(np.hypot(height(a, T_a, b, T_b), beside(a, T_a, b, T_b)))
+    return ContactFit(apart, float(np.arccos(np.clip(-cosine, -1.0, 1.0))))
