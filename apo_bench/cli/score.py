@@ -84,7 +84,7 @@ def score_command(
     name = name or command
     check_name("entry", name or method or "")
     records = out.with_suffix("")
-    with program_method(command, records) if command else nullcontext(method) as found:
+    with program_method(command, records) if command else nullcontext(str(method)) as found:
         entry = score(
             found,
             tracks,

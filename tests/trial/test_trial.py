@@ -30,7 +30,6 @@ from apo_bench.trial.fingerprint import config_hash, content_hash
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.run import run_measured
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
-from apo_bench.viz.trial_text import trial_lines
 
 SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 
