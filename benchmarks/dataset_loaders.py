@@ -1,7 +1,7 @@
 """Whether the loaders of others read what `apo-bench dataset make` writes: `python benchmarks/dataset_loaders.py`.
 
 Replays and insertions are made here in every format, and read in environments made for it by pip: by LeRobot (with
-`--python312`, since it needs Python 3.12 or later; its PyTorch is some 5 GB), by Minari, and by mlcroissant. Each says
+`--python312`, since it needs Python 3.12 or later; its PyTorch is some 5 GB), and by Minari. Each says
 what it found, compared with what PyArrow or h5py read here. LeRobot also trains a small policy and evaluates it, as the
 guide says. `--envs FOLDER` keeps the environments for the next time.
 Needs h5py: `pip install apo_bench[data]`.
@@ -25,7 +25,7 @@ MADE = {
 }
 NEEDS = {
     "lerobot": ("lerobot[dataset,training]", str(ROOT)),
-    "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]"),
+    "minari": ("minari[hdf5]", "pillow"),
 }
 LEROBOT = """
 import sys
@@ -79,15 +79,6 @@ assert steps == data.total_steps and len(data.sample_episodes(2)) == 2
 right = data.filter_episodes(lambda episode: bool(episode.infos["success"][-1]))
 print(f"Minari {version('minari')}: {data.total_episodes} episodes, {steps} steps, {right.total_episodes} right, of",
       data.env_spec.id if data.env_spec else "no environment")
-"""
-CROISSANT = """
-import logging, sys
-from importlib.metadata import version
-import mlcroissant
-logging.disable(logging.WARNING)
-data = mlcroissant.Dataset(jsonld=f"{sys.argv[1]}/croissant.json")
-read = [f"{sum(1 for _ in data.records(each.id))} of {each.id}" for each in data.metadata.record_sets]
-print(f"mlcroissant {version('mlcroissant')}: {len(data.metadata.distribution)} files and sets;", *read)
 """
 
 
@@ -159,7 +150,6 @@ def main() -> None:
                         trains(lerobot, out)
                 if form == "minari":
                     reads(others, MINARI, out)
-                reads(others, CROISSANT, out)
 
 
 if __name__ == "__main__":
