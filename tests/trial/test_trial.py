@@ -22,7 +22,6 @@ from apo_bench import (
     run_trial,
 )
 from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
-from apo_bench.viz.trial_text import trial_lines
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, noise_pair, outcomes
@@ -34,6 +33,7 @@ from apo_bench.trial.nominal import move_nominal_poses
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.run import run_measured
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
+from apo_bench.viz.form_text import fact_lines
 
 SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 
@@ -141,15 +141,11 @@ def test_a_schedule_is_carried_out_and_counted(
     assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
-def test_a_person_reads_attempts_and_predictions(rows: dict[str, dict[str, Any]]) -> None:
+def test_a_person_reads_attempts(rows: dict[str, dict[str, Any]]) -> None:
     tried = [{"step": 3, "free": [3], "gap_mm": 1.528}, {"step": 3, "free": [3, 2], "gap_mm": None}]
-    more: Any = {"tried_corrections": tried, "corrected_operations": [3, 2], "extra_operations": 2}
-    said = dict(trial_lines(rows["uncorrected"] | more))
-    assert said["attempts"] == "after step 3 {3} leaves 1.528 mm; after step 3 {3,2} did not converge"
-    assert said["corrected operations"] == "{3,2}"
-    assert said["extra operations"].startswith("2 ")
-    assert said["predicted failure"].startswith("operation 3 fails: residual, ")
-    assert dict(trial_lines(rows["paper"]))["predicted failure"] == "none, 0.00 mm"
+    said = dict(fact_lines(rows["uncorrected"] | {"tried_corrections": tried}))
+    assert said["tried corrections"] == "step 3, free 3, gap mm 1.528; step 3, free 3, 2"
+    assert said["failure prediction"].startswith("fails True, operation 3, code residual")
 
 
 def doubts(seen: Observation) -> Correction:
