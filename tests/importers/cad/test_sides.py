@@ -60,4 +60,4 @@ def test_the_command_takes_a_number_of_sides(tmp_path: Path) -> None:
     run = CliRunner()
     given = ["part", "import", str(path), "--out", str(tmp_path)]
     assert "cylinder of 8 sides" in run.invoke(app, [*given, "--round", "8"]).output
-    assert "4 is not in the range 5<=x<=64" in str(run.invoke(app, [*given, "--round", "4"]).exception)
+    assert run.invoke(app, [*given, "--round", "4"]).exit_code == 2

@@ -29,7 +29,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         InputError: A face of it could not be cut into triangles, or its shell is open.
     """
     is_whole = all(len(face.triangles) for face in solid.faces)
-    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
+    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; correct it where it was drawn.")
     mesh, owner = _mesh(solid.faces)
     check_closed(path, mesh)
     surfaces = [face.surface for face in solid.faces]
