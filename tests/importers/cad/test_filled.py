@@ -67,13 +67,12 @@ def test_crumbs_that_hang_on_nothing_are_left_out() -> None:
         return Hull("", np.array(list(product((x - half, x + half), *[(-half, half)] * 2))))
 
     near, far, crumb = cube(0.0, 0.01), cube(0.0205, 0.01), cube(0.05, 0.0005)
-    kept, lost, is_one = cutting._drop_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
+    kept, lost = cutting._drop_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
     assert len(kept) == 2
     assert lost == 1
-    assert is_one
     # What is more is no crumb: it stays, and is refused with the part.
-    assert cutting._drop_crumbs([near, far], 2.0) == ([near, far], 0, False)
-    assert cutting._drop_crumbs([near], 2.0) == ([near], 0, True)
+    assert cutting._drop_crumbs([near, far], 2.0) == ([near, far], 0)
+    assert cutting._drop_crumbs([near], 2.0) == ([near], 0)
 
 
 def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_reason(
