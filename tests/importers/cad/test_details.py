@@ -17,7 +17,7 @@ from apo_bench.importers.cad.importing import _fault, import_part, raw_solids
 from apo_bench.importers.cad.part_report import file_lines, part_lines, report_part
 from apo_bench.importers.cad.pieces.corners import corners_of, without_near
 from apo_bench.importers.cad.step.from_brep import raw_of
-from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall
+from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.scenario.parts import load_part
 from tests.importers.cad.made import block, disc, prism, rod, write_stl, write_triangles
 
@@ -74,8 +74,8 @@ def as_brep(body: Any) -> BrepSolid:
     wall = (np.abs(reach - 5.0) < 0.01) & (np.abs(normals[:, 2]) < 0.1)
     index = np.arange(3 * len(corners)).reshape(-1, 3)
     z = np.array([0.0, 0.0, 1.0])
-    round_face = BrepFace(Wall(Round(np.zeros(3), z, 5.0, 0.0), 0.0), corners[wall].reshape(-1, 3), index[: wall.sum()])
-    flat = [BrepFace(Flat(p[0], -n, 0.0), p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
+    round_face = BrepFace(Round(np.zeros(3), z, 5.0, 0.0), 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()])
+    flat = [BrepFace(Plane(p[0], -n), 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
     return BrepSolid("a", (round_face, *flat), ())
 
 

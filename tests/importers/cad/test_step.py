@@ -15,8 +15,8 @@ import pytest
 from apo_bench import InputError
 from apo_bench.cli.app import main
 from apo_bench.importers.cad.importing import ImportedPart, import_part, raw_solids
+from apo_bench.importers.cad.step.brep import read_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
-from apo_bench.importers.cad.step.open_cascade import solids_of
 from tests.importers.cad.brep_made import brep_made, write_step
 from tests.importers.cad.held import hold
 
@@ -40,7 +40,7 @@ KINDS = [
 def imported(shape: Any, folder: Path) -> ImportedPart:
     """In this process, which has read build123d already."""
     path = write_step(shape, folder / "a.step")
-    (solid,) = solids_of(path)
+    (solid,) = read_solids(path)
     return import_part(raw_of(path, solid), "a", folder, "a.step", density=8000.0)
 
 
@@ -126,7 +126,7 @@ def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pyte
     assert third["color"] == [0, 0.5, 1]
     text = re.sub(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)',)'[^']*'", r"\1'copy \2'", path.read_text())
     path.write_text(text)
-    names = {place.name for solid in solids_of(path) for place in solid.places}
+    names = {place.name for solid in read_solids(path) for place in solid.places}
     assert len(names) == 3
     assert all(name.startswith("copy ") for name in names)
 
@@ -147,7 +147,7 @@ def test_names_that_are_not_latin_are_titles(kind: str, tmp_path: Path) -> None:
             written = written.decode("latin-1").encode("utf-8")
         raw = raw.replace(f"'{latin}'".encode(), b"'" + written + b"'")
     path.write_bytes(raw)
-    assert {solid.name for solid in solids_of(path)} == {"底板", "销钉"}
+    assert {solid.name for solid in read_solids(path)} == {"底板", "销钉"}
 
 
 def test_units_are_those_of_the_file(tmp_path: Path) -> None:
