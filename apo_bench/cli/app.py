@@ -14,7 +14,7 @@ import typer
 from apo_bench import __version__
 from apo_bench.cli import arm, assembly, dataset, inspection, method, noise, part, recording, scenario, track
 from apo_bench.cli.compare import compare_command
-from apo_bench.cli.correct import correct_command
+from apo_bench.cli.correct_command import correct_command
 from apo_bench.cli.detect_command import detect_contacts_command
 from apo_bench.cli.doctor import doctor_command
 from apo_bench.cli.leaderboard import leaderboard_command

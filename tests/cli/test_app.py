@@ -157,7 +157,7 @@ def test_the_default_method_is_the_same_everywhere() -> None:
     from inspect import signature
 
     from apo_bench import Corrected, SweepConfig, TrialConfig, correct
-    from apo_bench.cli.correct import correct_command
+    from apo_bench.cli.correct_command import correct_command
     from apo_bench.cli.inspect_poses import poses_command
     from apo_bench.cli.shared import trial_options
     from apo_bench.records import CORRECTOR

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, Scenario, build_scene, draw_layout, load_scenario
+from apo_bench import Plan, Scenario, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
@@ -211,24 +211,6 @@ def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
         assert json.loads(out)["steps"][0]["trouble"] in out
 
 
-def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """What was seen, as it is: castle 2 aside changes the line of operation 2; corrected, what hangs on it follows."""
-    lines = SEEN.read_text(encoding="utf-8").splitlines()
-    cells = lines[2].split(",")
-    cells[3] = f"{float(cells[3]) + 0.5:g}"
-    aside = tmp_path / "seen.csv"
-    aside.write_text("\n".join([*lines[:2], ",".join(cells), *lines[3:]]), encoding="utf-8")
-    for method, changed in (("uncorrected", [2]), ("contact", [1, 2, 3])):
-        texts = []
-        for path in (SEEN, aside):
-            code, out, err = run(
-                capsys, "inspect", "plan", "stick_in_tower", "--observation", str(path), "--method", method
-            )
-            assert (code, err) == (0, "")
-            texts.append([line for line in out.splitlines() if line[:1].isdigit()])
-        assert [i for i, (a, b) in enumerate(zip(*texts, strict=True), start=1) if a != b] == changed
-
-
 def test_a_plan_that_takes_apart(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(
         capsys, "inspect", "plan", "stick_in_tower", "--observation", str(SEEN), "--method", "paper-track", "--json"
@@ -254,42 +236,6 @@ def test_undoing_reverses_the_macros() -> None:
         ("slide-to-contact", "-y"),
     ]
     assert (cube.came_from, cube.back_to, cube.target) == ("T4", "T2", None)
-
-
-TOWER = (ROOT / "scenarios" / "stick_in_tower.toml").read_text(encoding="utf-8")
-ATTACH = 'attach = { along = "+x", travel_mm = 160 }\n'
-
-
-def tower(folder: Path, attach: str) -> Scenario:
-    path = folder / "tower.toml"
-    path.write_text(TOWER.replace(ATTACH, attach), encoding="utf-8")
-    return load_scenario(path)
-
-
-@pytest.mark.parametrize(
-    ("attach", "along", "travel_mm"),
-    [
-        ("", 1.0, 160.0),
-        ('attach = { along = "-x", travel_mm = 140 }\n', -1.0, 140.0),
-    ],
-)
-def test_a_line_of_attach_is_a_preference(tmp_path: Path, attach: str, along: float, travel_mm: float) -> None:
-    line = tower(tmp_path, attach).attach[2]
-    assert line.direction.tolist() == [along, 0.0, 0.0]
-    assert line.travel_m == pytest.approx(1e-3 * travel_mm, abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("attach", "words"),
-    [
-        ('attach = { along = "-z" }\n', ("operation 3, attach, along", "castle2.sfl")),
-        ('attach = { along = "+x", travel_mm = 139 }\n', ("operation 3, attach, travel_mm", "139", "at least 140")),
-    ],
-)
-def test_a_line_that_cannot_be_one_is_refused(tmp_path: Path, attach: str, words: tuple[str, ...]) -> None:
-    with pytest.raises(InputError) as refused:
-        tower(tmp_path, attach)
-    assert all(word in str(refused.value) for word in words), refused.value
 
 
 @pytest.mark.parametrize("name", SOME)

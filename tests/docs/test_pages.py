@@ -1,4 +1,4 @@
-"""What README and documentation tell a person to type works: all commands are parsed, quick ones and all Python run.
+"""Commands and Python of README and documentation work: all commands are parsed, quick ones and all Python run.
 
 Each page is a session in an empty folder, from top to bottom. A block with a title is a file of that name. A `text`
 block right behind a Python block is what that one prints. What stands on several pages runs on the first of them.
@@ -34,23 +34,23 @@ BLOCK = re.compile(
 )
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 PARSED_ONLY: Mapping[str, str] = {
-    r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
+    r"sweep ": "minutes: many trials; tests/benchmark/sweeps runs small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
     r"noise fit ": "needs the results of a pose estimator; tests/perception/observation/test_fit.py runs it",
     r"run .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
     r"run .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
     r"run .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
     r"run .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
-    r"run .*--pose-source depth-camera": "many depth images; tests/depth_camera runs them",
-    r"inspect depth ": "many depth images; tests/depth_camera runs them",
+    r"run .*--pose-source depth-camera": "many depth images; tests/perception/depth_camera runs them",
+    r"inspect depth ": "many depth images; tests/perception/depth_camera runs them",
     r"(view |run .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
-    r"part import ": "needs a CAD file; tests/cad runs it",
-    r"assembly import .*\.step ": "needs the extra cad; tests/cad runs it",
-    r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; tests/cad reads such files",
-    r"scenario check ": "trials of seconds each; tests/drafting runs it without",
-    r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
+    r"part import ": "needs a CAD file; tests/importers/cad runs it",
+    r"assembly import .*\.step ": "needs the extra cad; tests/importers/cad runs it",
+    r"recording import tracker|(correct|inspect plan|run) clamp": "needs STEP files; tests/importers reads such files",
+    r"scenario check ": "trials of seconds each; tests/importers/assembly runs it without",
+    r"(score|leaderboard) ": "minutes: many trials; tests/benchmark/scoring runs small ones",
     r"noise show ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
-    r"run stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; replays of other pages run",
+    r"run stick_in_tower --noise-level 1 --seed 7 --method (uncorrected|contact)$": "seconds each; other pages replay",
 }
 """Commands that are not run, by how they begin, and why."""
 
@@ -104,11 +104,6 @@ def test_the_command_line_takes_every_command_of_the_pages(line: Line) -> None:
     command.make_context("apo-bench", words)
 
 
-def test_an_option_that_is_not_there_would_be_noticed() -> None:
-    with pytest.raises(Exception, match="--nothing"):
-        test_the_command_line_takes_every_command_of_the_pages(Line(PAGES[0], ("scenario", "list", "--nothing")))
-
-
 def test_each_reason_not_to_run_a_command_is_of_a_command() -> None:
     assert [how for how in PARSED_ONLY if not any(re.match(how, " ".join(line.words)) for line in LINES)] == []
 
@@ -121,10 +116,6 @@ def test_targets_of_make_and_scripts_that_pages_name_are_there() -> None:
     scripts = set(re.findall(r"python ((?:benchmarks|docs)/\w+\.py)", text))
     assert len(scripts) > 5
     assert [script for script in scripts if not (ROOT / script).exists()] == []
-
-
-def test_the_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 
 
 def sessions() -> Iterator[tuple[Path, list[Block | Line]]]:
@@ -156,20 +147,6 @@ def same_output(printed: str, shown: str, within: float = 0.02) -> bool:
     )
 
 
-@pytest.mark.parametrize(
-    ("printed", "shown", "same"),
-    [
-        ("gap 5.77 mm", "gap 5.78  mm", True),
-        ("gap 0.31 mm", "gap 0.36 mm", False),
-        ("gap 0.3 mm", "gap 0.3 cm", False),
-        ("True", "False", False),
-        ("1 2", "1 2 3", False),
-    ],
-)
-def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str, shown: str, same: bool) -> None:
-    assert same_output(printed, shown) is same
-
-
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     """But for quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners, tracking, tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
@@ -196,11 +173,6 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
         "apo_bench.scenario.parts.making",
         "apo_bench.testing",
     }
-
-
-def test_the_trial_by_hand_has_ten_lines() -> None:
-    first = blocks(ROOT / "docs" / "guide" / "first-trial.md")[0]
-    assert sum(bool(line) and not line.startswith("import ") for line in first.text.splitlines()) <= 10
 
 
 @pytest.mark.parametrize("page", SESSIONS, ids=lambda page: str(page.relative_to(ROOT)))

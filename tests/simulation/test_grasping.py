@@ -44,7 +44,7 @@ def nominal(scene: Scene, schedule: tuple[Step, ...] = ()) -> Plan:
 
 def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float, poses: Poses) -> float:
     """How deep the gripper is in any part but the moved one."""
-    boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
+    boxes = gripper_boxes(scene.kinematics, opening)
     T = T_part @ T_tip
     around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
     return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.pieces, o.T)[0]) for o in around)

@@ -113,7 +113,7 @@ def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
         assert left is not None
         assert robot.wrist is None
         assert np.linalg.norm(robot.T[:3, 3] - translate(robot.T, UP, 0.0)[:3, 3]) == 0.0
-        reach = max(box.center[2] + box.half[2] for box in gripper_boxes(scene.kinematics, scene.arm, 0.002))
+        reach = max(box.center[2] + box.half[2] for box in gripper_boxes(scene.kinematics, 0.002))
         assert robot.T[2, 3] == pytest.approx(reach, abs=5e-5)
         assert left == pytest.approx(robot.T[2, 3] - 0.004, abs=1e-4)
 

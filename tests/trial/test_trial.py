@@ -22,7 +22,6 @@ from apo_bench import (
     run_trial,
 )
 from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
-from apo_bench.viz.trial_text import trial_lines
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, noise_pair, outcomes
@@ -34,6 +33,7 @@ from apo_bench.trial.nominal import move_nominal_poses
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.run import run_measured
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
+from apo_bench.viz.trial_text import trial_lines
 
 SPEC = TrialConfig("stick_in_tower", grasp="weld", method="uncorrected", seed=5)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,14 +15,10 @@ from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
-from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
-from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.viz.arm_text import describe_arm
 from apo_bench.viz.correct_text import POSE_COLUMNS, correction_form, correction_lines
 from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
-from apo_bench.viz.fit_text import fit_form, fit_lines
 from apo_bench.viz.tables import form_table
-from tests import bop_made, scenes
+from tests import scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
 BESIDE = Contact(PartFace("castle1", "py"), PartFace("table", "top"))
@@ -126,33 +121,3 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
     assert form["test"]["chi_square"] is None
     json.dumps(form, allow_nan=False)
     assert dict(correction_lines(failed, None))["test"].endswith("the contacts contradict each other")
-
-
-def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
-    from apo_bench.formats.bop import read_results
-    from apo_bench.formats.bop_truth import read_truth
-    from apo_bench.perception.observation.models.residuals import match_residuals
-
-    drawn = bop_made.draw(600, bop_made.Known(), np.random.default_rng(5))
-    estimates, truth = bop_made.files(tmp_path, drawn)
-    found = estimates.read_text(encoding="utf-8").splitlines()
-    absent = [",".join([*line.split(",")[:2], "77", *line.split(",")[3:]]) for line in found[1:61:5]]
-    estimates.write_text("\n".join([*found, *dict.fromkeys(absent)]) + "\n", encoding="utf-8")
-    seen = read_results(estimates)
-    residuals = match_residuals(seen, read_truth(truth, seen))
-    measured = fit_noise(residuals, "made")
-    figures = goodness_of_fit(residuals, measured)
-    form = fit_form(residuals, measured, figures)
-    assert (form["parts"], form["images"]) == (600, 120)
-    assert form["left_over"] == residuals.surplus > 0
-    said = dict(line.split("  ", 1) for line in fit_lines(form) if "  " in line)
-    assert said["left over"].strip() == str(residuals.surplus)
-    assert said["images"].strip() == "120"
-    json.dumps(form, allow_nan=False)
-
-
-def test_an_arm_is_listed_with_what_it_can_hold() -> None:
-    arm = find_arm("six_axis")
-    line = describe_arm(arm)
-    assert line.startswith(f"6 joints, opens {2e3 * arm.opening_m:.1f} mm")
-    assert line.endswith(f"; {arm.control}")

@@ -16,7 +16,6 @@ from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import RestingPart, Stroke, arrival_line, first_clear, obstacles
-from apo_bench.simulation.robot import ArmAlone
 
 _ARM = "six_axis"
 _OVER_M = (0.0, 0.005, 0.0085)
@@ -49,7 +48,7 @@ def find_grasps(
         fixtures: Part -> its fixture at the start.
     """
     arm = find_arm(_ARM)
-    hand = ArmAlone(arm, Kinematics(arm))
+    kinematics = Kinematics(arm)
     best: dict[str, Grasp | None] = {}
     crowded = set[str]()
     now = {part: np.array(poses[part]) for part in (TABLE, *base)}
@@ -65,7 +64,7 @@ def find_grasps(
         lift = Stroke(taken.T, -UP, _LIFT_M, taken.around)
         strokes = (lift, _stroke(solids, placing, now, goal))
         places = [*_places_from_above(solid, taken.T, arm.opening_m)]
-        clear = (first_clear(hand, solid, grasps, (taken, goal), strokes) for grasps in places)
+        clear = (first_clear(kinematics, solid, grasps, (taken, goal), strokes) for grasps in places)
         best[main] = next((grasp for grasp in clear if grasp is not None), None)
         if best[main] is None and (offered := holds(solid, _up(goal.T), arm.opening_m)):
             best[main] = _grasp(offered[0])

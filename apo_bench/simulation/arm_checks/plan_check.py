@@ -98,7 +98,7 @@ def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tupl
 def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
     go; zero and nothing where they have room."""
-    boxes = gripper_boxes(scene.kinematics, scene.arm, min(grip.half_width + beyond, scene.arm.opening_m))
+    boxes = gripper_boxes(scene.kinematics, min(grip.half_width + beyond, scene.arm.opening_m))
     T = poses[part] @ grip.T_part_tip
     depths = [
         (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other], 0.0)[0]), other)

@@ -29,11 +29,11 @@ class Kinematics:
     """How much an arm with more than six joints prefers its home, as a cost: the tip is off by some 1e-8 m for it."""
 
     def __init__(self, arm: Arm, posture: bool = True) -> None:
+        self.arm = arm
         self.model = _alone(arm)
         self.configuration = mink.Configuration(self.model)
         self.ids = [int(self.model.joint(j).id) for j in arm.joints]
         self.adr = self.model.jnt_qposadr[self.ids]
-        self._mount = arm.mount
         self.site = self.model.site(arm.tip).id
         self._leans = len(arm.joints) < 6
         turning = self.LEANING if self._leans else 0.3
@@ -60,7 +60,7 @@ class Kinematics:
     @property
     def first_link(self) -> str:
         """The first body of the arm that moves: everything that moves hangs on it."""
-        tree = self.model.body_treeid[self.model.body(self._mount).id]
+        tree = self.model.body_treeid[self.model.body(self.arm.mount).id]
         return str(self.model.body(int(self.model.tree_bodyadr[tree])).name)
 
     @property

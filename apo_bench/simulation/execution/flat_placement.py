@@ -79,7 +79,7 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
             return None
     tip = flush @ t.grips[0].T_part_tip
     width = t.grips[0].half_width
-    if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
+    if gripper_depth(scene.kinematics, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
         return None
     return highest
 

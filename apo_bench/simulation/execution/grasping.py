@@ -22,8 +22,9 @@ from apo_bench.geometry import (
     upright_bounds,
 )
 from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import HasGripper, Obstacle, gripper_boxes, obstacle, translate
+from apo_bench.simulation.robot import Obstacle, gripper_boxes, obstacle, translate
 from apo_bench.simulation.scene import Scene
 
 _STAND_OFF_M = 0.012
@@ -78,9 +79,9 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
     solid = scene.scenario.assembly.solids[part]
-    if any(_clear(scene, solid, [preferred], places, _MARGINS_M[-1])):
+    if any(_clear(scene.kinematics, solid, [preferred], places, _MARGINS_M[-1])):
         return preferred
-    return first_clear(scene, solid, _candidates(scene, solid, places[0].T), places) or preferred
+    return first_clear(scene.kinematics, solid, _candidates(scene, solid, places[0].T), places) or preferred
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
@@ -94,8 +95,12 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
     stays = Stroke(place.T, up, 0.0, place.around)
     solid = scene.scenario.assembly.solids[part]
     able = [grasp for grasp in _candidates(scene, solid, place.T) if abs(grasp.across @ level) > 0.99]
-    able = [grasp for grasp in able if _closed_depth(scene, solid, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0]
-    return first_clear(scene, solid, able, [place])
+    able = [
+        grasp
+        for grasp in able
+        if _closed_depth(scene.kinematics, solid, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0
+    ]
+    return first_clear(scene.kinematics, solid, able, [place])
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
@@ -109,15 +114,17 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
     ends = (*places, RestingPart(stroke.T, stroke.around))
     solid = scene.scenario.assembly.solids[part]
     least = _MARGINS_M[-1]
-    if any(_clear(scene, solid, [preferred], ends, least)) and not _nearest(scene, solid, preferred, stroke, least):
+    if any(_clear(scene.kinematics, solid, [preferred], ends, least)) and not _nearest(
+        scene.kinematics, solid, preferred, stroke, least
+    ):
         return Grips(preferred)
     everything = _candidates(scene, solid, places[0].T)
-    if one := first_clear(scene, solid, everything, ends, [stroke]):
+    if one := first_clear(scene.kinematics, solid, everything, ends, [stroke]):
         return Grips(one)
     for margin in _MARGINS_M:
         able = [
-            (_nearest(scene, solid, grasp, stroke, margin), grasp)
-            for grasp in _clear(scene, solid, everything, places, margin)
+            (_nearest(scene.kinematics, solid, grasp, stroke, margin), grasp)
+            for grasp in _clear(scene.kinematics, solid, everything, places, margin)
         ]
         pair = _pair(scene, solid, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
         if pair is not None:
@@ -165,13 +172,13 @@ def _pair(
 ) -> Grips | None:
     """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
     goal = RestingPart(stroke.T, stroke.around)
-    last = list(_clear(scene, solid, _candidates(scene, solid, stroke.T), [goal], margin))
+    last = list(_clear(scene.kinematics, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
         change = RestingPart(translate(stroke.T, stroke.way, -left), stroke.around)
-        if 0.0 < left < _MOST_LEFT_M and any(_clear(scene, solid, [first], [change], margin)):
+        if 0.0 < left < _MOST_LEFT_M and any(_clear(scene.kinematics, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
-            for second in _clear(scene, solid, last, [change], margin):
-                if _nearest(scene, solid, second, near, margin) == 0.0:
+            for second in _clear(scene.kinematics, solid, last, [change], margin):
+                if _nearest(scene.kinematics, solid, second, near, margin) == 0.0:
                     return Grips(first, left, second)
     return None
 
@@ -205,7 +212,7 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
 
 
 def first_clear(
-    hand: HasGripper,
+    kinematics: Kinematics,
     solid: Solid,
     grasps: Sequence[Grasp],
     places: Sequence[RestingPart],
@@ -213,17 +220,18 @@ def first_clear(
 ) -> Grasp | None:
     """The first of those around which there is most room at every place, and all along strokes, or None."""
     widest, *less = _MARGINS_M
-    first = next(_clear(hand, solid, grasps, places, widest, strokes), None)
+    first = next(_clear(kinematics, solid, grasps, places, widest, strokes), None)
     # What is not clear with the least room is not with more.
-    left = [] if first is not None else list(_clear(hand, solid, grasps, places, less[-1], strokes))
+    left = [] if first is not None else list(_clear(kinematics, solid, grasps, places, less[-1], strokes))
     margins = less[:-1] if left else ()
     return next(
-        (g for m in margins for g in _clear(hand, solid, left, places, m, strokes)), first or next(iter(left), None)
+        (g for m in margins for g in _clear(kinematics, solid, left, places, m, strokes)),
+        first or next(iter(left), None),
     )
 
 
 def _clear(
-    hand: HasGripper,
+    kinematics: Kinematics,
     solid: Solid,
     grasps: Sequence[Grasp],
     places: Sequence[RestingPart],
@@ -248,12 +256,12 @@ def _clear(
             groups.setdefault(kind(grasp), []).append(k)
         free = np.ones(len(some), dtype=np.bool_)
         for those in groups.values():
-            free[those] = _is_clear(hand, solid, [some[k] for k in those], places, margin, strokes)
+            free[those] = _is_clear(kinematics, solid, [some[k] for k in those], places, margin, strokes)
         yield from (grasp for grasp, is_free in zip(some, free, strict=True) if is_free)
 
 
 def _is_clear(
-    hand: HasGripper,
+    kinematics: Kinematics,
     solid: Solid,
     same: Sequence[Grasp],
     places: Sequence[RestingPart],
@@ -262,19 +270,19 @@ def _is_clear(
 ) -> NDArray[np.bool_]:
     """Which of some grasps of one direction and width are clear, (k,)."""
     width = _known_width(solid.pieces, same[0], places[0].T)
-    opening = min(width + _STAND_OFF_M, hand.arm.opening_m)
+    opening = min(width + _STAND_OFF_M, kinematics.arm.opening_m)
     points = np.array([grasp.point for grasp in same])
     free = np.ones(len(same), dtype=np.bool_)
     # All points at once: the tip has one orientation at a place.
     for place in places:
         R, at = _tips(same[0], points, place.T)
-        free &= gripper_depth(hand, opening, R, at, place.around, margin) <= 0.0
+        free &= gripper_depth(kinematics, opening, R, at, place.around, margin) <= 0.0
     for stroke in strokes:
         able = np.flatnonzero(free)
         if len(able) and stroke.travel > 0.0:
             R, at = _tips(same[0], points[able], stroke.T)
             every = (at[:, None] - _lefts(stroke)[:, None] * stroke.way).reshape(-1, 3)
-            depth = gripper_depth(hand, width, R, every, stroke.around, margin)
+            depth = gripper_depth(kinematics, width, R, every, stroke.around, margin)
             free[able] = (depth.reshape(len(able), -1) <= 0.0).all(axis=1)
     return free
 
@@ -285,10 +293,10 @@ def _tips(grasp: Grasp, points: Array, T: Array) -> tuple[Array, Array]:
     return R, points @ T[:3, :3].T + T[:3, 3]
 
 
-def _nearest(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, margin: float) -> float:
+def _nearest(kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
     lefts = _lefts(stroke)
-    struck = _closed_depth(hand, solid, grasp, stroke, lefts, margin) > 0.0
+    struck = _closed_depth(kinematics, solid, grasp, stroke, lefts, margin) > 0.0
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
 
 
@@ -297,22 +305,24 @@ def _lefts(stroke: Stroke) -> Array:
     return np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
 
 
-def _closed_depth(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float) -> Array:
+def _closed_depth(
+    kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float
+) -> Array:
     """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
     width = _known_width(solid.pieces, grasp, stroke.T)
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
-    return gripper_depth(hand, width, tip[:3, :3], at, stroke.around, margin)
+    return gripper_depth(kinematics, width, tip[:3, :3], at, stroke.around, margin)
 
 
 def gripper_depth(
-    hand: HasGripper, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
+    kinematics: Kinematics, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
 ) -> Array:
     """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
 
     What its way does not come by counts as far away.
     """
-    boxes = gripper_boxes(hand.kinematics, hand.arm, opening, margin)
+    boxes = gripper_boxes(kinematics, opening, margin)
     low, high = upright_bounds(boxes, R, np.zeros(3))
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)

@@ -132,7 +132,7 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
         if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
             return False
     at = tip[:3, 3] + whole
-    if gripper_depth(scene, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
+    if gripper_depth(scene.kinematics, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
         return False
     over = scene.kinematics.inverse(with_height(tip, t.safe), np.array(scene.arm.home))
     return over is not None and scene.kinematics.inverse(tip, over) is not None

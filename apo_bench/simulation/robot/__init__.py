@@ -2,7 +2,7 @@
 
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
 from apo_bench.simulation.robot.forces import Guard, LowPass
-from apo_bench.simulation.robot.gripper import ArmAlone, HasGripper, gripper_boxes
+from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
 from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, obstacle
 from apo_bench.simulation.robot.paths import (
@@ -32,11 +32,9 @@ __all__ = (
     "BANDWIDTH_HZ",
     "READING_S",
     "TINY_S",
-    "ArmAlone",
     "ExecutionAborted",
     "GraspSlipMonitor",
     "Guard",
-    "HasGripper",
     "LowPass",
     "Moving",
     "Obstacle",

@@ -68,7 +68,7 @@ def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
         return
     before = robot.wrist, robot.fidelity
     robot.wrist, robot.fidelity = wrist, "full"
-    wrist.begin(hand_load(robot.scene.kinematics, robot.arm, robot.opening()))
+    wrist.begin(hand_load(robot.scene.kinematics, robot.opening()))
     try:
         with wrist_sensors_on(robot.model):
             robot.wait(_SETTLE_S)

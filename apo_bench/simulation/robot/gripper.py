@@ -5,7 +5,7 @@ Openings are of each finger, [m].
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,24 +24,9 @@ _LONGEST_S = 0.2
 """How long fingers of a stiff drive may take to rest behind their command."""
 
 
-class HasGripper(Protocol):
-    """A scene, or an arm alone."""
-
-    @property
-    def arm(self) -> Arm: ...
-    @property
-    def kinematics(self) -> Kinematics: ...
-
-
-class ArmAlone(NamedTuple):
-    """An arm of which no scene is made yet."""
-
-    arm: Arm
-    kinematics: Kinematics
-
-
-def open_hand(kinematics: Kinematics, arm: Arm, opening: float) -> tuple[Any, Array]:
+def open_hand(kinematics: Kinematics, opening: float) -> tuple[Any, Array]:
     """The arm alone with its hand at an opening, as `MjData`, and the tip there, (4, 4)."""
+    arm = kinematics.arm
     model = kinematics.model
     data = mujoco.MjData(model)
     for finger, joint in zip(arm.fingers, arm.finger_joints(opening), strict=True):
@@ -53,16 +38,16 @@ def open_hand(kinematics: Kinematics, arm: Arm, opening: float) -> tuple[Any, Ar
 
 
 @lru_cache(maxsize=64)
-def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
+def gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
     """The geoms of the gripper that can touch something, in the frame of the tip, each as the box around it.
 
     Args:
         margin: Added on every level side, [m]; above and below, `_UPRIGHT_M` is.
     """
     model = kinematics.model
-    data, T_tip = open_hand(kinematics, arm, opening)
+    data, T_tip = open_hand(kinematics, opening)
     R = T_tip[:3, :3]
-    hanging = below(model, model.body(arm.mount).id)
+    hanging = below(model, model.body(kinematics.arm.mount).id)
     touching = (model.geom_contype | model.geom_conaffinity) != 0
     boxes = []
     for g in range(model.ngeom):

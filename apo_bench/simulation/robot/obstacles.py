@@ -60,7 +60,7 @@ def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held:
     """The gripper at an opening [m], and the parts that it holds, as they move with the tip."""
     inverse = pose.inverse(T_tip)
     parts = [Moving(scene.pieces[part], inverse @ part_pose(scene.work, data, part)) for part in held]
-    return [Moving(gripper_boxes(scene.kinematics, scene.arm, round(opening, 4)), np.eye(4)), *parts]
+    return [Moving(gripper_boxes(scene.kinematics, round(opening, 4)), np.eye(4)), *parts]
 
 
 def near_spans(

@@ -16,7 +16,6 @@ import numpy as np
 from apo_bench.geometry import Array, pose
 from apo_bench.records import FtNoise
 from apo_bench.scenario.parts import read_part
-from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import body_frame
 from apo_bench.simulation.robot.forces import Guard
@@ -41,10 +40,10 @@ class Load(NamedTuple):
     """Its centre of mass, (3,), in the frame of the tip, [m]."""
 
 
-def hand_load(kinematics: Kinematics, arm: Arm, opening: float) -> Load:
+def hand_load(kinematics: Kinematics, opening: float) -> Load:
     """The hand at an opening [m], by the model of the arm alone."""
-    data, T_tip = open_hand(kinematics, arm, opening)
-    mount = kinematics.model.body(arm.mount).id
+    data, T_tip = open_hand(kinematics, opening)
+    mount = kinematics.model.body(kinematics.arm.mount).id
     center = T_tip[:3, :3].T @ (data.subtree_com[mount] - T_tip[:3, 3])
     return Load(float(kinematics.model.body_subtreemass[mount]), center)
 
@@ -104,7 +103,7 @@ class WristSensor:
         self._part = low_pass_part(bandwidth_hz)
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
         self._zero: Array = np.zeros(6)
-        data, T_tip = open_hand(scene.kinematics, scene.arm, scene.arm.opening_m)
+        data, T_tip = open_hand(scene.kinematics, scene.arm.opening_m)
         mount = body_frame(data, scene.kinematics.model.body(scene.arm.mount).id)
         self._T_tip_sensor = pose.inverse(T_tip) @ mount  # both are on the same rigid body
         self._sum: Array = np.zeros(6)
@@ -112,7 +111,7 @@ class WristSensor:
         self._clock_s = 0.0
         self._felt: Array | None = None
         self._readings: list[Array] | None = None
-        self._hand = hand_load(scene.kinematics, scene.arm, scene.arm.opening_m)
+        self._hand = hand_load(scene.kinematics, scene.arm.opening_m)
         self._held: tuple[Load, ...] = ()
         self._weights: Array = np.zeros((6, 3))
         self.hold()

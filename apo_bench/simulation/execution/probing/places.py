@@ -189,7 +189,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
-    return gripper_boxes(scene.kinematics, scene.arm, OPENING_M)
+    return gripper_boxes(scene.kinematics, OPENING_M)
 
 
 def _lowest(boxes: Sequence[Box]) -> Array:
@@ -204,7 +204,7 @@ def _lowest(boxes: Sequence[Box]) -> Array:
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
     """Whether the hand can come straight down to a pose that the arm reaches."""
     lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
-    if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
+    if gripper_depth(scene.kinematics, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
     above = scene.kinematics.inverse(translate(T, UP, _LIFT_M), np.array(scene.arm.home))
     return above is not None and scene.kinematics.inverse(T, above) is not None
