@@ -42,13 +42,13 @@ def one_line(text: str, longest: int) -> str:
 
 
 def failed(what: str, error: BaseException) -> InputError:
-    """`the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another.`, to raise from it."""
+    """`the noise model 'mine' failed: it raised RuntimeError('oops'); correct it, or use another.`, to raise from it."""
     try:
         text = " ".join(str(error).split()) if type(error) in (ValueError, ArgumentError) else ""
         said = text.rstrip(".") or f"it raised {' '.join(repr(error).split())}"
     except Exception:
         said = f"it raised {type(error).__name__}"
-    return InputError(f"{what} failed: {said}; mend it, or use another.")
+    return InputError(f"{what} failed: {said}; correct it, or use another.")
 
 
 def missing_package(what: str, package: str, instead: str = "") -> InputError:

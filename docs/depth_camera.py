@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.viz.depth_run import run_depth_camera
 from apo_bench.viz.depth_picture import draw_depth
+from apo_bench.viz.depth_run import run_depth_camera
 
 HERE = Path(__file__).parent
 SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}

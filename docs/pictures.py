@@ -17,7 +17,7 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.rollout import Rollout
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
-from apo_bench.viz.poses_picture import poses_panel, draw_poses
+from apo_bench.viz.poses_picture import draw_poses, poses_panel
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 7

@@ -361,7 +361,7 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
         "goals": of.goals,
         "part_files": {},
         "colors": {},
-        "human_error_scale": None,
+        "human_error": None,
     }
     values |= {"attach": given.attach[:1] * n, "grasps": given.grasps[:1] * n, "shifts": ()}
     return Scenario(**(values | changes))

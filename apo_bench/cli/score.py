@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,8 +40,6 @@ def score_command(
         str | None,
         typer.Option(metavar="PROGRAM", help="Program that reads a request, one line of JSON, and answers."),
     ] = None,
-    answers: Annotated[Path | None, path_option("File with one answer for each request of --export.")] = None,
-    export: Annotated[Path | None, path_option("Write all requests: .jsonl; no score.")] = None,
     estimator: Annotated[
         Path | None,
         path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
@@ -61,14 +60,13 @@ def score_command(
       apo-bench score contact --out entries/contact.json
       apo-bench score mine:correct --track given --quick --out entry.json
     """
-    from apo_bench.benchmark.scoring.entrants import entrant, exported
     from apo_bench.benchmark.scoring.entry import check_name, form_of, read_entry, write_entry
+    from apo_bench.benchmark.scoring.program import program_method
     from apo_bench.benchmark.scoring.score import score
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
     from apo_bench.viz.form_text import form_table
 
-    given = [option for option in (method, command, answers, export) if option is not None]
-    require(len(given) == 1, f"name one of METHOD, --command, --answers and --export; {len(given)} are given.")
+    require((method is None) != (command is None), "name either METHOD or --command.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
@@ -79,21 +77,16 @@ def score_command(
         "address": address,
         "secret_seed_file": secret_seed_file,
     }
-    if export is not None:
-        check_output(export, "--export", ".jsonl")
-        count = exported(tracks, export, **how)
-        typer.echo(f"{count} requests in {export}; answer each one, and pass the answers by --answers.")
-        return
     if out is None:
         raise InputError("--out is missing; name the file of the entry, such as entry.json.")
     out.parent.mkdir(parents=True, exist_ok=True)
     check_output(out, "--out", ".json")
     if out.exists():
         read_entry(out)  # only an entry may be replaced
-    name = name or command or (None if answers is None else answers.name)
+    name = name or command
     check_name("entry", name or method or "")
     records = out.with_suffix("")
-    with entrant(method, command, answers, records, tracks, **how) as found:
+    with program_method(command, records) if command else nullcontext(str(method)) as found:
         entry = score(
             found,
             tracks,

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 DEVIATION_MM = 1.0
@@ -26,11 +26,9 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
         ("deviation_mm", deviation_mm, 1e-3, SHIFT_M),
         ("deviation_deg", deviation_deg, pi / 180.0, TURN_RAD),
     ):
-        number = isinstance(deviation, int | float | np.floating | np.integer) and not isinstance(deviation, bool)
-        if not number or not is_within(deviation * size, limits):
-            low, high = (x / size for x in limits)
-            text = f"{deviation:g}" if number else repr(deviation)
-            raise InputError(f"{name} {text} was given; a number from {low:g} to {high:g} is allowed.")
+        low, high = (x / size for x in limits)
+        allowed = is_within(deviation * size, limits)
+        require(allowed, f"{name} {deviation:g} was given; a number from {low:g} to {high:g} is allowed.")
 
 
 def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:

@@ -25,6 +25,7 @@ from apo_bench.io.safe_io import decoded, each_line, opened, read_bytes, read_te
 from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
 from apo_bench.io.streams import redirect_output
 from apo_bench.io.text import columns, direction, listed_words, with_article
+from apo_bench.io.toml_text import toml_text
 
 __all__ = (
     "CONTROL",
@@ -67,6 +68,7 @@ __all__ = (
     "redirect_output",
     "replace_file",
     "save_figure",
+    "toml_text",
     "with_article",
     "write_columns",
     "write_csv",

@@ -1,9 +1,8 @@
 """The tables [parts] and [[operations]] of a scenario file become parts and operations."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,24 +20,21 @@ from apo_bench.scenario.scenario import Grasp, Shift, Turn
 from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, VaryTable
 from apo_bench.scenario.values import check_span, normalize_axis
 
-_MOST_SHIFTS = 20
-"""In a scenario: each is checked at both ends."""
 _ARM = "arm"
 """What the robot is called in a scene."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class PartEntry:
+class PartEntry(NamedTuple):
     """One entry of [parts]."""
 
+    table: PartTable
     path: Path
     solid: Solid
-    fixed: bool
-    follows_site: bool
-    start: Array
-    """(4, 4), [m]."""
-    color: tuple[float, float, float] | None
+
+    @property
+    def start(self) -> Array:
+        """Where it starts, (4, 4), [m]."""
+        return np.eye(4) if self.table.start is None else self.table.start.matrix
 
 
 class OperationEntry(NamedTuple):
@@ -71,26 +67,15 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
         table = convert_typed(value, PartTable, place)
         require(table.fixed or not table.follows_site, f"{place}, follows_site: only a fixed part can follow the site.")
         require(table.fixed or table.start, f"{place}: the key 'start' is missing; say where the part stands.")
-        parts[name] = _part(table, place, file.parent, solids, checked)
+        try:
+            path = file.parent / part_path(table.file)
+            if path not in solids:
+                solids[path] = load_part(path, checked)
+            solid = with_fit(solids[path], table.fit) if table.fit else solids[path]
+            parts[name] = PartEntry(table, path, solid)
+        except InputError as error:
+            raise InputError(f"{place}: {error}") from error
     return parts
-
-
-def _part(table: PartTable, place: str, folder: Path, solids: dict[Path, Solid], checked: bool) -> PartEntry:
-    try:
-        path = folder / part_path(table.file)
-        if path not in solids:
-            solids[path] = load_part(path, checked)
-        solid = solids[path]
-    except InputError as error:
-        raise InputError(f"{place}, file: {error}") from error
-    for face in table.fit:
-        require_known("face", face, (*solid.faces, *solid.rounds), place=f"{place}, fit")
-    try:
-        solid = with_fit(solid, table.fit) if table.fit else solid
-    except InputError as error:
-        raise InputError(f"{place}, fit: {error}") from error
-    start = np.eye(4) if table.start is None else table.start.matrix
-    return PartEntry(path, solid, table.fixed, table.follows_site, start, table.color)
 
 
 def read_operations(
@@ -98,7 +83,7 @@ def read_operations(
 ) -> tuple[OperationEntry, ...]:
     """Every operation in order, with defaults filled in."""
     poses = {name: part.start for name, part in parts.items()}
-    there = {name for name, part in parts.items() if part.fixed}
+    there = {name for name, part in parts.items() if part.table.fixed}
     entries: list[OperationEntry] = []
     for k, table in enumerate(tables):
         place = f"{file}, operation {k + 1}"
@@ -108,8 +93,6 @@ def read_operations(
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
-    count = sum(len(entry.varies) for entry in entries)
-    require(count <= _MOST_SHIFTS, f"{file}, operations: at most {_MOST_SHIFTS} 'vary' are allowed, not {count}.")
     return tuple(entries)
 
 
@@ -126,8 +109,8 @@ def _entry(
     for name in table.carries:
         at = f"{place}, carries"
         _check_movable(name, at, parts)
-        require(name != main, f"{at}: '{name}' would carry itself, it is the moved part.")
-        require(table.carries.count(name) == 1, f"{at}: '{name}' stands here twice; name it once.")
+        once = (main, *table.carries).count(name) == 1
+        require(once, f"{at}: '{name}' is moved already; name every part once.")
         require(name in there, f"{at}: '{name}' is carried before any operation has moved it; move it first.")
     solids = {name: part.solid for name, part in parts.items()}
     gaps = read_contacts(table.contacts, place, (main, *table.carries), solids, there)
@@ -144,7 +127,7 @@ def _entry(
 
 def _check_movable(name: str, place: str, parts: Mapping[str, PartEntry]) -> None:
     require_known("part", name, parts, place=place)
-    require(not parts[name].fixed, f"{place}: '{name}' is fixed and cannot be moved; move another part.")
+    require(not parts[name].table.fixed, f"{place}: '{name}' is fixed and cannot be moved; move another part.")
 
 
 def _attach(table: AttachTable, place: str) -> Preference:

@@ -3,7 +3,6 @@
 Lengths in mm, angles in degrees, operations numbered from 1; the file of the scenario `stick_in_tower` shows every key.
 """
 
-import os
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -42,8 +41,7 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     """The scenario of a short name, `generated:SEED` or `generated:FAMILY:SEED`, of a TOML file anywhere, or the
     object itself.
 
-    Part files in it are short names, or paths relative to the scenario file. Of a short name it is one object for as
-    long as the files of the package stay as they are.
+    Part files in it are short names, or paths relative to the scenario file. Of a name it is read once.
 
     Raises:
         InputError: No such scenario, or the file breaks a rule; one sentence with file, key, what was given, what is
@@ -51,27 +49,14 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     """
     if isinstance(given, Scenario):
         return given
-    path = scenario_path(given)
-    if is_generated(given):
-        return _generated(path, whole_name(str(given)))
-    return _kept(path, _stamps()) if path.stem == given else _read(path)
+    if isinstance(given, str) and is_named(given):
+        return _load_named(whole_name(given) if is_generated(given) else given)
+    return _read(scenario_path(given))
 
 
-def _stamps() -> tuple[tuple[str, int, int], ...]:
-    """Name, time and size of every file that scenarios of the package are made of."""
-    folders = (folder("scenarios"), folder("assets") / "parts")
-    entries = [(each.path, each.stat(follow_symlinks=False)) for place in folders for each in os.scandir(place)]
-    return tuple(sorted((path, stat.st_mtime_ns, stat.st_size) for path, stat in entries))
-
-
-@lru_cache(maxsize=64)
-def _kept(path: Path, stamps: tuple[tuple[str, int, int], ...]) -> Scenario:
-    return _read(path)
-
-
-@lru_cache(maxsize=64)
-def _generated(path: Path, name: str) -> Scenario:
-    return replace(_read(path, checked=False), name=name)
+@lru_cache(maxsize=128)
+def _load_named(name: str) -> Scenario:
+    return replace(_read(scenario_path(name), checked=not is_generated(name)), name=name)
 
 
 def _read(path: Path, checked: bool = True) -> Scenario:
@@ -102,7 +87,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
     assembly = Assembly(
         {name: part.solid for name, part in parts.items()},
         tuple(entry.operation for entry in entries),
-        frozenset(name for name, part in parts.items() if part.fixed),
+        frozenset(name for name, part in parts.items() if part.table.fixed),
         {contact: gap for entry in entries for contact, gap in entry.gaps.items() if gap != Gap()},
     )
     moved = {part for operation in assembly.operations for part in operation.moves}
@@ -120,7 +105,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         success=top.success,
         assembly=assembly,
         part_files={name: part.path for name, part in parts.items()},
-        colors={name: part.color for name, part in parts.items() if part.color is not None},
+        colors={name: part.table.color for name, part in parts.items() if part.table.color is not None},
         start={name: part.start for name, part in parts.items()},
         goals=np.array([entry.goal for entry in entries]),
         attach=(),
@@ -133,7 +118,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         success_means=success_means,
         clearance_mm=top.clearance_mm,
         gap_mm=top.gap_mm,
-        follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
+        follows_site=frozenset(name for name, part in parts.items() if part.table.follows_site),
         source=path,
     )
     return scenario, tuple(entry.attach for entry in entries)

@@ -35,7 +35,7 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
     """
     own = {operation.part: operation for operation in explanation.operations}
     poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
-    first = explanation.goals[0]
+    first = explanation.poses[0]
     azimuth = float(np.degrees(np.arctan2(first[1, 0], first[0, 0]))) + _AZIMUTH_DEG
     camera = camera_view(*frame_parts(scenario.assembly, [poses], own), azimuth, _ELEVATION_DEG)
     # the horizontal direction towards the camera
@@ -50,7 +50,7 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
             lines.append(PanelLine(_describe(explanation, own[part.part]), color))
     scene = build_scene(scenario)
     image = picture(scene, poses, *_SIZE, camera, Marks(marks))
-    title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.goals)}"
+    title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.poses)}"
     figure = draw_panels(title, [Panel(image, lines)])
     for mark in marks:
         _write_name(figure.axes[0], mark, pixels(mark.tips, camera, float(scene.shown.model.vis.global_.fovy), *_SIZE))

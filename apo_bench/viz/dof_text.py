@@ -22,7 +22,7 @@ PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "devi
 def count_directions(explanation: Explanation) -> str:
     """`the contacts fix 13 of 18 directions; 5 are free and 14 of 27 equations redundant`."""
     redundant = f"{explanation.redundant} of {explanation.rank + explanation.redundant} equations redundant"
-    fixed = f"{explanation.rank} of {6 * len(explanation.goals)} directions"
+    fixed = f"{explanation.rank} of {6 * len(explanation.poses)} directions"
     return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
@@ -81,7 +81,7 @@ def dof_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
                 "part": o.part,
                 "rank": o.rank,
                 "fixed": list(o.fixed),
-                "free": [_free_form(free, explanation.goals[o.operation]) for free in o.free],
+                "free": [_free_form(free, explanation.poses[o.operation]) for free in o.free],
                 "through": list(map(_hold_form, o.through)),
                 "agreeing": list(map(_hold_form, o.agreeing)),
                 "covariance_mm_deg": covariance_form(o.covariance),

@@ -62,11 +62,11 @@ def relations(assembly, start, goals, rng):
     raise ValueError("told nothing")
 """
 RAISED = {
-    "name": "the noise model 'name' failed: it raised NameError(\"name 'no_such_name' is not defined\"); mend it",
+    "name": "the noise model 'name' failed: it raised NameError(\"name 'no_such_name' is not defined\"); correct it",
     "imports": "the noise model 'imports' failed: it raised ModuleNotFoundError(",
-    "plain": "the noise model 'plain' failed: it raised TypeError('of my own'); mend it, or use another.",
-    "Init": "the noise model 'users_code:Init' failed: it raised RuntimeError('init oops'); mend it, or use another.",
-    "Slow": "the noise model 'users_code:Slow' failed: it raised KeyError('no deviation'); mend it, or use another.",
+    "plain": "the noise model 'plain' failed: it raised TypeError('of my own'); correct it, or use another.",
+    "Init": "the noise model 'users_code:Init' failed: it raised RuntimeError('init oops'); correct it, or use another.",
+    "Slow": "the noise model 'users_code:Slow' failed: it raised KeyError('no deviation'); correct it, or use another.",
 }
 
 
@@ -108,12 +108,12 @@ class Unspeakable(Exception):
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (KeyError("k"), "failed: it raised KeyError('k'); mend it, or use another."),
-        (ValueError("two\nlines."), "failed: two lines; mend it, or use another."),
-        (ValueError(), "failed: it raised ValueError(); mend it, or use another."),
-        (ValueError(np.eye(2)), "failed: [[1. 0.] [0. 1.]]; mend it, or use another."),
-        (ZeroDivisionError(np.eye(2)), "failed: it raised ZeroDivisionError(array([[1., 0.], [0., 1.]])); mend it"),
-        (Unspeakable(), "failed: it raised Unspeakable; mend it, or use another."),
+        (KeyError("k"), "failed: it raised KeyError('k'); correct it, or use another."),
+        (ValueError("two\nlines."), "failed: two lines; correct it, or use another."),
+        (ValueError(), "failed: it raised ValueError(); correct it, or use another."),
+        (ValueError(np.eye(2)), "failed: [[1. 0.] [0. 1.]]; correct it, or use another."),
+        (ZeroDivisionError(np.eye(2)), "failed: it raised ZeroDivisionError(array([[1., 0.], [0., 1.]])); correct it"),
+        (Unspeakable(), "failed: it raised Unspeakable; correct it, or use another."),
         (InputError("say this."), "say this."),
     ],
 )

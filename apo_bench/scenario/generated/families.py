@@ -38,7 +38,7 @@ class Family(NamedTuple):
     """Assemblies of one kind."""
 
     title: str
-    kinds: tuple[Kind, ...]
+    kinds: tuple[str, ...]
     """What may stand on the board."""
     sizes: tuple[int, int]
     """Least and most parts, the board among them."""
@@ -53,7 +53,7 @@ class Family(NamedTuple):
         while not stations or _length(stations) > _LONGEST:
             size = int(rng.integers(self.sizes[0], self.sizes[1] + 1)) - 1
             count = int(rng.integers(1, _MOST + 1))
-            kinds = [self.kinds[int(k)] for k in rng.integers(len(self.kinds), size=count)]
+            kinds = [_KINDS[self.kinds[int(k)]] for k in rng.integers(len(self.kinds), size=count)]
             least = [kind.least for kind in kinds]
             most = [kind.most for kind in kinds]
             if sum(least) <= size <= sum(most):
@@ -90,31 +90,33 @@ def place_stations(title: str, stations: Sequence[Station], rng: np.random.Gener
 
 _MOST = 4
 """Stations on a board."""
-_CORNER = Kind(make_corner, 1, 3)
-_PEG = Kind(make_peg, 1, 2)
-_POST = Kind(make_post, 1, 3)
-_COVERED = Kind(make_covered, 3, 9)
-_PINNED = Kind(make_pinned, 3, 5)
-_BRIDGED = Kind(make_bridged, 3, 9)
-_KEYED = Kind(make_keyed, 3, 6)
-_GROOVED = Kind(make_grooved, 3, 6)
-_CARRIED = Kind(make_carried, 3, 3)
-_CASTLED = Kind(make_castled, 3, 7)
-_THREADED = Kind(make_threaded, 2, 3)
-_EVERY = (_CORNER, _PEG, _POST, _COVERED, _PINNED, _BRIDGED, _KEYED, _GROOVED, _CARRIED)
+_KINDS: Mapping[str, Kind] = {
+    "corner": Kind(make_corner, 1, 3),
+    "peg": Kind(make_peg, 1, 2),
+    "post": Kind(make_post, 1, 3),
+    "covered": Kind(make_covered, 3, 9),
+    "pinned": Kind(make_pinned, 3, 5),
+    "bridged": Kind(make_bridged, 3, 9),
+    "keyed": Kind(make_keyed, 3, 6),
+    "grooved": Kind(make_grooved, 3, 6),
+    "carried": Kind(make_carried, 3, 3),
+    "castled": Kind(make_castled, 3, 7),
+    "threaded": Kind(make_threaded, 2, 3),
+}
+_EVERY = ("corner", "peg", "post", "covered", "pinned", "bridged", "keyed", "grooved", "carried")
 
 FAMILIES: Mapping[str, Family] = {
-    "corners": Family("Blocks in corners of walls, and piles of blocks", (_CORNER,), (3, 10), 2, False),
-    "pegs": Family("Axles with collars in bores, and rings over them", (_PEG,), (3, 9), 2, False),
-    "posts": Family("Plates over one post or two", (_POST,), (3, 10), 2, False),
-    "covers": Family("A cover over axles, and rings on it", (_COVERED,), (4, 10), 2, False),
-    "carried": Family("Axles that carry their rings from a stand", (_CARRIED,), (4, 10), 2, False),
-    "pinned": Family("Loose plates that axles join", (_PINNED,), (4, 12), 3, True),
-    "bridges": Family("Loose towers that plates join", (_BRIDGED,), (4, 10), 3, True),
-    "keys": Family("Keys in a slot that a bar joins", (_KEYED,), (4, 12), 3, True),
-    "grooves": Family("Keys with tilted faces that a bar joins", (_GROOVED,), (4, 12), 3, True),
+    "corners": Family("Blocks in corners of walls, and piles of blocks", ("corner",), (3, 10), 2, False),
+    "pegs": Family("Axles with collars in bores, and rings over them", ("peg",), (3, 9), 2, False),
+    "posts": Family("Plates over one post or two", ("post",), (3, 10), 2, False),
+    "covers": Family("A cover over axles, and rings on it", ("covered",), (4, 10), 2, False),
+    "carried": Family("Axles that carry their rings from a stand", ("carried",), (4, 10), 2, False),
+    "pinned": Family("Loose plates that axles join", ("pinned",), (4, 12), 3, True),
+    "bridges": Family("Loose towers that plates join", ("bridged",), (4, 10), 3, True),
+    "keys": Family("Keys in a slot that a bar joins", ("keyed",), (4, 12), 3, True),
+    "grooves": Family("Keys with tilted faces that a bar joins", ("grooved",), (4, 12), 3, True),
     "mixed": Family("Stations of all kinds", _EVERY, (5, 12), 6, True),
-    "castles": Family("Loose blocks that a stick in their slots joins", (_CASTLED,), (4, 8), 0, True),
-    "rods": Family("Loose brackets that a level rod joins", (_THREADED,), (3, 4), 0, True),
+    "castles": Family("Loose blocks that a stick in their slots joins", ("castled",), (4, 8), 0, True),
+    "rods": Family("Loose brackets that a level rod joins", ("threaded",), (3, 4), 0, True),
 }
 """Those with weight 0 are held out: no `generated:SEED` is one of them, nor has a kind of station of theirs."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from apo_bench.io import write_file
-from apo_bench.scenario.generated.assembly import GeneratedAssembly
+from apo_bench.io import toml_text, write_file
+from apo_bench.scenario.generated.assembly import Act, GeneratedAssembly
 from apo_bench.scenario.generated.laying import Table
 from apo_bench.scenario.parts.making import Body, write_part
 
@@ -35,7 +36,7 @@ def write(made: GeneratedAssembly, table: Table, folder: Path, name: str) -> Pat
                 part, made.parts[part], folder, density=_DENSITY, friction=_FRICTION, source=_SOURCE, licence=_LICENCE
             )
     path = folder / f"{name}.toml"
-    write_file(path, "\n".join(_lines(made, table, files)) + "\n")
+    write_file(path, toml_text(_document(made, table, files)))
     return path
 
 
@@ -45,34 +46,44 @@ def _stems(parts: Mapping[str, Body]) -> Mapping[str, str]:
     return {name: first.setdefault(id(body), name) for name, body in parts.items()}
 
 
-def _lines(made: GeneratedAssembly, table: Table, files: Mapping[str, str]) -> Iterable[str]:
-    yield from ("schema = 1", f'title = "{made.title}"', 'paper = "generated"', "clearance_mm = 0.25", "gap_mm = 0.1")
-    yield from ("", "[parts.table]", 'file = "table"', "fixed = true")
+def _document(made: GeneratedAssembly, table: Table, files: Mapping[str, str]) -> dict[str, Any]:
+    parts: dict[str, Any] = {"table": {"file": "table", "fixed": True}}
     for k, part in enumerate(made.parts):
-        yield from ("", f"[parts.{part}]", f'file = "{files[part]}.xml"')
-        color = _GREY if part in made.fixed else _COLORS[k % len(_COLORS)]
-        yield f"color = {_list(color)}"
-        if part in made.fixed:
-            yield from ("fixed = true", "follows_site = true", f"start = {{ at_mm = {_list(made.fixed[part])} }}")
-        else:
-            yield f"start = {{ at_mm = {_list(table.starts[part])} }}"
-    for act in made.acts:
-        yield from ("", "[[operations]]", f'move = "{act.part}"')
-        if act.carries:
-            yield f"carries = {_names(act.carries)}"
-        yield f"goal = {{ at_mm = {_list(act.at)} }}"
-        yield f"contacts = [{', '.join(map(_names, act.contacts))}]"
-        yield f'grasp = {{ at_mm = {_list(act.grasp)}, across = "{act.across}" }}'
-        if act.vary_mm:
-            varies = (f'{{ along = "{axis}", mm = [{-far:g}, {far:g}] }}' for axis, far in act.vary_mm)
-            yield f"vary = [{', '.join(varies)}]"
-    yield from ("", "[site]", f"center_mm = {_list(table.center)}", f"spread_mm = {_list(table.spread)}")
-    yield f"yaw_deg = [{-table.yaw_deg:g}, {table.yaw_deg:g}]"
+        is_fixed = part in made.fixed
+        parts[part] = {
+            "file": f"{files[part]}.xml",
+            "color": _GREY if is_fixed else _COLORS[k % len(_COLORS)],
+            "fixed": is_fixed,
+            "follows_site": is_fixed,
+            "start": {"at_mm": _round_lengths((made.fixed if is_fixed else table.starts)[part])},
+        }
+    return {
+        "schema": 1,
+        "title": made.title,
+        "paper": "generated",
+        "clearance_mm": 0.25,
+        "gap_mm": 0.1,
+        "parts": parts,
+        "operations": [_operation(act) for act in made.acts],
+        "site": {
+            "center_mm": _round_lengths(table.center),
+            "spread_mm": _round_lengths(table.spread),
+            "yaw_deg": [-table.yaw_deg, table.yaw_deg],
+        },
+    }
 
 
-def _list(values: Iterable[float]) -> str:
-    return "[" + ", ".join(f"{float(np.round(value, 4)) + 0.0:g}" for value in values) + "]"
+def _operation(act: Act) -> dict[str, Any]:
+    return {
+        "move": act.part,
+        "carries": act.carries,
+        "contacts": act.contacts,
+        "goal": {"at_mm": _round_lengths(act.at)},
+        "grasp": {"at_mm": _round_lengths(act.grasp), "across": act.across},
+        "vary": [{"along": axis, "mm": [-far, far]} for axis, far in act.vary_mm],
+    }
 
 
-def _names(words: Iterable[str]) -> str:
-    return "[" + ", ".join(f'"{word}"' for word in words) + "]"
+def _round_lengths(values: Iterable[float]) -> list[float]:
+    """Return lengths of at most six digits, none below a ten-thousandth of a millimetre."""
+    return [float(f"{float(np.round(value, 4)) + 0.0:g}") for value in values]

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from apo_bench.errors import require_known
 from apo_bench.geometry import Face, RoundFace, Solid, receded_pieces
 from apo_bench.scenario.parts.agreement import check_receding
 
 
 def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
-    """The solid with these faces marked as fit, each moved into it by its undersize first.
+    """Mark these faces of a solid as fit, each moved into it by its undersize first.
 
     A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
     the clearance. Outlines of faces beside keep what was there.
@@ -21,9 +22,11 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
 
     Raises:
-        InputError: A face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
+        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
             piece.
     """
+    for face in undersizes_mm:
+        require_known("face", face, (*solid.faces, *solid.rounds), place="fit")
     pieces = solid.pieces
     for depth_mm in sorted({*undersizes_mm.values()} - {0.0}):
         names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}

@@ -6,25 +6,18 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
 
-import gymnasium
 import numpy as np
 import pytest
 
 from apo_bench import (
-    InputError,
     Observation,
     Scene,
-    SweepConfig,
     TrialConfig,
     build_scene,
     load_scenario,
-    run_sweep,
     run_trial,
 )
-from apo_bench.benchmark.sweeps import sweep
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.perception.depth_camera.range_finder import RangeFinder
@@ -39,9 +32,6 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     stream,
 )
-from tests import pages
-
-SVG_TEXT = "{http://www.w3.org/2000/svg}text"
 
 TWO = ("stick_in_tower", "carried_bridge")
 
@@ -123,16 +113,6 @@ def test_it_is_quiet_only_when_nothing_changes_for_a_while() -> None:
 
 
 @pytest.mark.parametrize("name", TWO)
-def test_images_are_of_parts_at_rest(name: str) -> None:
-    """Without noise every pose is that at which the hand had let go, so firings are neither early nor late."""
-    seen = observed(name, 0.0)
-    assert seen.observed.all()
-    off = errors(name, seen)
-    assert np.abs(off[:, :3]).max() < 0.1
-    assert np.abs(off[:, 3:]).max() < 0.1
-
-
-@pytest.mark.parametrize("name", TWO)
 def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> None:
     seen = observed(name, 1.0)
     off = errors(name, seen)
@@ -141,21 +121,6 @@ def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> N
     assert np.median(np.linalg.norm(off[:, 3:], axis=1)) < 1.0
     eigenvalues = np.linalg.eigvalsh(seen.covariance)
     assert (eigenvalues > 0.0).all()
-
-
-def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
-    one, again, two = (observed("stick_in_tower", noise_level) for noise_level in (1.0, 1.0, 2.0))
-    assert one.poses.tobytes() == again.poses.tobytes()
-    assert one.covariance.tobytes() == again.covariance.tobytes()
-    assert (one.poses != two.poses).any()
-    assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
-    fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "depth-camera").images
-    known = watched("stick_in_tower").images
-    assert fresh is not None
-    assert known is not None
-    assert fresh.times_s == known.times_s
-    for a, b in zip(fresh.images, known.images, strict=True):
-        assert a.distance.tobytes() == b.distance.tobytes()
 
 
 @pytest.mark.parametrize("seed", [2, 3])
@@ -224,149 +189,3 @@ def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.C
     assert [operation["found"] for operation in form["operations"]] == [True, True]
     assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-
-
-def figure_texts(run: Path) -> dict[str, list[str]]:
-    """Name of a figure of a report -> its texts, each line for itself."""
-    found = {path.stem: ElementTree.parse(path).iter(SVG_TEXT) for path in (run / "figures").glob("*.svg")}
-    return {name: ["".join(text.itertext()) for text in texts] for name, texts in found.items()}
-
-
-@pytest.fixture
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sweeps start no worker."""
-    monkeypatch.setattr(sweep, "run_sweep", lambda *a, **k: run_sweep(*a, **{**k, "workers": None}))
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    asked = [
-        "--pose-source",
-        "depth-camera",
-        "--noise-level",
-        "0.5",
-        "--human-error-scale",
-        "0",
-        "--method",
-        "uncorrected,contact",
-        "--trials",
-        "1",
-    ]
-    out = tmp_path / "run"
-    more = [
-        "--contact-source",
-        "detected",
-        "--clearance-mm",
-        "0.25,0.3",
-        "--fidelity",
-        "near-contact",
-        "--out",
-        str(out),
-    ]
-    assert main(["sweep", "block_on_block", *asked, *more]) == 0
-    assert main(["report", str(out)]) == 0
-    said = capsys.readouterr().out
-    page = pages.words(out / "report.html")
-    for text in (said, page):
-        assert "0.5 mm per ray" in text
-        assert "0 deg" not in text
-    assert "of the range finder it is one of L mm per ray" in page
-    drawn = figure_texts(out)
-    for name, texts in drawn.items():
-        assert not [text for text in texts if "deg" in text or "range noise" in text], name
-    for name in ("success_over_noise_level", "gap_before_and_after"):
-        assert {"level: mm per ray", "0.5"} <= set(drawn[name])
-    assert "0.5 mm per ray" in drawn["detected"]
-    assert "range finder, relations recognised" in " ".join(drawn["success_over_noise_level"])
-
-
-def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
-    options = [
-        "--pose-source",
-        "noise,range",
-        "--noise-level",
-        "1",
-        "--human-error-scale",
-        "0",
-        "--method",
-        "uncorrected",
-        "--trials",
-        "1",
-    ]
-    out = tmp_path / "run"
-    for _ in range(2):
-        assert main(["sweep", "block_on_block", *options, "--workers", "1", "--out", str(out)]) == 0
-        rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
-        assert sorted((row["pose_source"], row["noise"], row["noise_deg"]) for row in rows) == [
-            ("noise-model", "isotropic", 1.0),
-            ("depth-camera", "depth-camera", 0.0),
-        ]
-    assert main(["report", str(out)]) == 0
-    axis = "level: mm and degrees per axis; level: mm per ray"
-    assert axis in figure_texts(out)["success_over_noise_level"]
-    page = pages.words(out / "report.html")
-    assert "of the range finder it is one of L mm per ray" in page
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        *(["--noise-mm", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
-    ],
-)
-def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
-    wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        "apo_bench.viz.depth_run.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
-    )
-    assert main(["inspect", "depth", "block_on_block", *wrong]) == 2
-    said = capsys.readouterr().err.strip()
-    assert said
-    assert "Traceback" not in said
-    assert "degree" not in said
-
-
-@pytest.mark.parametrize("noise", ["camera"])
-def test_noise_models_are_refused_where_only_the_range_finder_looks(
-    noise: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "run"
-    assert main(["sweep", "block_on_block", "--pose-source", "depth-camera", "--noise", noise, "--out", str(out)]) == 2
-    assert "was given together with the eye 'depth-camera', which draws no pose noise" in capsys.readouterr().err
-    assert not out.exists()
-    with pytest.raises(InputError, match="draws no pose noise"):
-        SweepConfig(("block_on_block",), pose_source=("depth-camera",), noise=tuple(noise.split(",")))
-    with pytest.raises(InputError, match="draws no pose noise"):
-        gymnasium.make("APOReplay-v0", pose_source="depth-camera", noise=noise.split(",")[0])
-
-
-def test_what_draws_noise_depends_on_the_eyes() -> None:
-    assert SweepConfig(("block_on_block",), pose_source=("depth-camera",)).noise == ()
-    assert SweepConfig(("block_on_block",)).noise == ("isotropic",)
-    assert SweepConfig(("block_on_block",), pose_source=("depth-camera", "noise-model")).noise == ("isotropic",)
-    assert SweepConfig(("block_on_block",), pose_source=("depth-camera", "noise-model"), noise=("camera",)).noise == (
-        "camera",
-    )
-    with pytest.raises(InputError, match="draws no pose noise"):
-        TrialConfig("block_on_block", pose_source="depth-camera", noise="camera")
-
-
-@pytest.mark.parametrize("pose_source", [3, "rang"])
-def test_what_is_no_eye_is_refused(pose_source: Any) -> None:
-    with pytest.raises(InputError, match=r"unknown eye .* Known: noise, range\.|eye of APOReplay must be a text"):
-        gymnasium.make("APOReplay-v0", pose_source=pose_source)
-
-
-@pytest.mark.parametrize("noise_level", [(1.0, 1.0)])
-def test_the_level_of_the_range_finder_is_one_number(noise_level: Any) -> None:
-    with pytest.raises(InputError, match=r"mm per ray|level of APOReplay must be a number or a list"):
-        gymnasium.make("APOReplay-v0", pose_source="depth-camera", noise_level=noise_level)
-
-
-@pytest.mark.parametrize("human_error_scale", [None, "much", float("nan")])
-def test_carelessness_is_a_number(human_error_scale: Any) -> None:
-    with pytest.raises(InputError, match=r"must be a number from 0 to 10|careless of APOReplay must be a number"):
-        gymnasium.make("APOReplay-v0", human_error_scale=human_error_scale)

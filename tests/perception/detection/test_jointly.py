@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from apo_bench import Assembly, ContactCorrector, InputError, Observation
+from apo_bench import Assembly, ContactCorrector, Observation
 from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Hull, pose, ways_out
@@ -18,7 +17,7 @@ from apo_bench.geometry.penetration import intrusion
 from apo_bench.perception.detection.estimate import estimate
 from apo_bench.perception.detection.jointly import detect_contacts_jointly
 from tests import rounds, scenes
-from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated, without_contacts
+from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated
 
 
 def on(text: str) -> Contact:
@@ -108,13 +107,6 @@ def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float)
     assert recognised.probability > 0.5
 
 
-def test_contacts_that_come_with_the_observation_are_not_looked_at() -> None:
-    scene = scenes.ALL[NAMES[0]]()
-    seen = seen_at(scene, 0, 1.0)
-    blind = replace(seen, assembly=without_contacts(seen.assembly))
-    assert contacts(detect_contacts_jointly(seen).assembly) == contacts(detect_contacts_jointly(blind).assembly)
-
-
 def test_near_faces_touch_if_the_noise_explains_the_gap() -> None:
     assert names(detect_contacts_jointly(beside(1.0, 1.0)).assembly) >= {"B.nx on A.px"}
     assert "B.nx on A.px" not in names(detect_contacts_jointly(beside(8.0, 1.0)).assembly)
@@ -175,9 +167,3 @@ def test_round_faces_are_recognised_with_flat_ones() -> None:
     goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
     recognised = detect_contacts_jointly(stated(scenes.seen(scene, goals), 0.5))
     assert contacts(recognised.assembly) == contacts(scene.assembly)
-
-
-@pytest.mark.parametrize("given", [None, {"rules": 3}])
-def test_anything_else_is_refused(given: Any) -> None:
-    with pytest.raises(InputError, match=r"(observation|rules) of detect_contacts_jointly must be"):
-        detect_contacts_jointly(*([None] if given is None else [beside(1.0, 1.0)]), **(given or {}))

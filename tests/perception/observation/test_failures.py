@@ -39,7 +39,7 @@ def test_a_flip_is_by_an_approximate_symmetry():
     shown = demonstration()
     flipped = failures("flips", 1, rate=1.0)
     assert flipped.false.all()
-    for operation, T, seen in zip(shown.assembly.operations, shown.poses, flipped.goals, strict=True):
+    for operation, T, seen in zip(shown.assembly.operations, shown.poses, flipped.poses, strict=True):
         turns = approximate_symmetries(shown.assembly.solids[operation.main]).turns
         assert (np.abs(turns - pose.inverse(T) @ seen).max(axis=(1, 2)) < 1e-9).any()
 
@@ -49,22 +49,22 @@ def test_a_stale_pose_is_where_the_part_was_before():
     stale = failures("stale", 1, rate=1.0)
     mains = [operation.main for operation in shown.assembly.operations]
     assert mains[1] == mains[3]
-    assert_array_equal(stale.goals[3], shown.poses[1])
-    assert_array_equal(stale.goals[1], shown.start[mains[1]])
+    assert_array_equal(stale.poses[3], shown.poses[1])
+    assert_array_equal(stale.poses[1], shown.start[mains[1]])
 
 
 def test_swaps_exchange_two_views_of_like_parts():
     shown = demonstration()
     swapped = next(f for f in (failures("swaps", seed) for seed in range(99)) if f.false[0])
     assert shown.assembly.operations[2].main == "castle2"
-    assert_array_equal(swapped.goals[0], shown.poses[2])
-    assert_array_equal(swapped.goals[2], shown.poses[0])
+    assert_array_equal(swapped.poses[0], shown.poses[2])
+    assert_array_equal(swapped.poses[2], shown.poses[0])
 
 
 def test_an_error_along_the_ray_is_on_it():
     shown = demonstration()
     model = make_failures("rays", NOISE_LEVEL, rate=1.0)
-    off = failures("rays", 3, rate=1.0).goals[:, :3, 3] - shown.poses[:, :3, 3]
+    off = failures("rays", 3, rate=1.0).poses[:, :3, 3] - shown.poses[:, :3, 3]
     length = np.linalg.norm(off, axis=1)
     assert ((length >= 0.02) & (length <= 0.06)).all()
     assert_allclose(np.cross(off, model.camera.rays(shown.poses)), 0.0, atol=1e-12)
@@ -83,8 +83,8 @@ def test_a_mixture_fails_in_several_ways():
     flips, rays = (PRESETS[name]._replace(rate=0.2) for name in ("flips", "rays"))
     mixed = CameraFailures(NOISE_LEVEL, (flips, rays))
     seen = [mixed.draw_false(shown, np.random.default_rng(seed)) for seed in range(300)]
-    turned = [np.abs(views.goals - shown.poses)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
-    shifted = [np.abs(views.goals - shown.poses)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
+    turned = [np.abs(views.poses - shown.poses)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
+    shifted = [np.abs(views.poses - shown.poses)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
     assert 0.15 < np.mean(turned) < 0.25
     assert np.mean(shifted) > 0.15
     assert observe(shown, mixed, np.random.default_rng(0)).outliers.gross == pytest.approx(0.4)
@@ -100,7 +100,7 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
         first = model.draw_false(shown, np.random.default_rng(seed))
         look = Reobservations(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
         seen = look(range(5))
-        near = np.linalg.norm(seen.poses[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
+        near = np.linalg.norm(seen.poses[:, :3, 3] - first.poses[:, :3, 3], axis=1) < 6e-3
         repeated += near[first.false].tolist()
     assert abs(np.mean(repeated) - repeat) < 0.1
 
@@ -111,12 +111,6 @@ def test_rates_may_follow_the_name():
     assert make_noise("stale:r=0.5", NOISE_LEVEL).failures == make_noise("stale", NOISE_LEVEL).failures
     stated = observe(demonstration(), "flips:p=0.1/r=0.5", np.random.default_rng(1)).outliers
     assert (stated.gross, stated.repeat) == pytest.approx((0.1, 0.5))
-
-
-@pytest.mark.parametrize("given", ["flips:0.1", "flips:q=0.1", "flips:p=0.1/p=0.2"])
-def test_rates_that_are_none_are_refused(given):
-    with pytest.raises(InputError, match=rf"'{given}' was given; state how often the camera fails, 'flips:p=0\.1'"):
-        make_noise(given, NOISE_LEVEL)
 
 
 @pytest.mark.parametrize("given", ["flips:p=nan", "flips:r=-0.1"])

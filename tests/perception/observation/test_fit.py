@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +22,6 @@ from apo_bench.perception.observation.models.fitted import MeasuredNoise
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.models.tails import Split, Tail
 from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.viz.fit_picture import draw_fit
 from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
 from tests import bop_made as made_of
 from tests.bop_made import Known
@@ -182,20 +180,6 @@ def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
         fit_noise(compared_files(few, truth), "")
 
 
-def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Path) -> None:
-    """A scale at its bound is written and read again."""
-    drawn = made_of.draw(200, Known(outliers=0.0), np.random.default_rng(0))
-    shift = drawn.shift * [0.0, 0.0, 1.0]
-    t = drawn.t + np.einsum("nij,nj->ni", made_of.ray_frames(drawn.t), shift)
-    residuals = compared_files(*made_of.files(tmp_path, drawn._replace(t_seen=t)))
-    measured = fit_noise(residuals, "")
-    assert measured.shift_mm.across.scale < 0.006
-    path = tmp_path / "noise.toml"
-    path.write_text(noise_text(measured), encoding="utf-8")
-    assert_allclose([*read_noise(path)[0].shift_mm.along], [*measured.shift_mm.along], rtol=1e-4)
-    draw_fit(residuals, measured, tmp_path / "fit.png")
-
-
 @pytest.fixture(scope="module")
 def lmo(request: pytest.FixtureRequest) -> Residuals:
     return published(request, "lmo")
@@ -254,24 +238,6 @@ def test_a_fit_to_quantiles_meets_them() -> None:
     assert np.percentile(np.linalg.norm(np.random.default_rng(2).standard_normal((400_000, 3)), axis=1), 25) == (
         pytest.approx(LOWER_QUARTILE_OF_THREE, rel=0.01)
     )
-
-
-@pytest.mark.parametrize(
-    ("across", "along"), [({50: 1.0}, {50: 1.0, 90: 2.0}), ({50: 2.0, 90: 1.0}, {50: 1.0, 90: 2.0})]
-)
-def test_quantiles_that_make_no_sense_are_refused(across: Any, along: Any) -> None:
-    with pytest.raises(InputError, match="at least two are needed, which grow"):
-        split_of_quantiles(across, along, 50.0)
-
-
-@pytest.mark.parametrize("name", ["megapose-lmo", "megapose-tless"])
-def test_presets_name_their_source_and_come_without_outliers_too(name: str) -> None:
-    whole = read_noise(presets()[name])[0]
-    inliers = read_noise(presets()[f"{name}-inliers"])[0]
-    assert "BOP toolkit (MIT)" in whole.source
-    assert whole.missed > 0.1 < whole.outliers
-    assert (inliers.missed, inliers.outliers) == (0.0, 0.0)
-    assert (inliers.shift_mm, inliers.turn_deg) == (whole.shift_mm, whole.turn_deg)
 
 
 def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

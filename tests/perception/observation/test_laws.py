@@ -5,25 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench import Demonstration, Layout, Observation, Scene, TrialConfig, draw_layout, load_scenario, observe
-from apo_bench.assembly import placements
-from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
+from apo_bench import Demonstration, Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import sighted
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
 from apo_bench.perception.observation.models.isotropic import Isotropic
 from apo_bench.perception.observation.noise import FAILURES, NOISES, Noise, NoiseLevel, make_noise
-from apo_bench.trial import run
-from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream
 from tests import scenes
 
 NAMES = sorted(NOISES)
@@ -206,67 +200,3 @@ def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
     assert_array_equal(loose.poses, plain.poses)
     assert plain.observed[1]
     assert_allclose(loose.covariance - plain.covariance, human_error_scale, atol=1e-17)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A whole trial up to the robot: what `none` has it carry out are the model's goals for this seed, bit for bit."""
-    scenario = load_scenario("carried_bridge")
-    layout = draw_layout(scenario, stream(5, 0))
-    final = placements(scenario.assembly, layout.start, layout.poses)[-1]
-    n = len(scenario.assembly)
-    demonstration = Demonstration(scenario.assembly, layout.start, layout.poses, final, np.zeros((n, 6, 6)))
-    scene = object.__new__(Scene)
-    vars(scene).update(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
-    simulated = SimulatedDemonstration(Layout(layout.poses, layout.start), demonstration)
-    carried_out: list[Any] = []
-
-    class Carried(Exception):
-        pass
-
-    def refuse(plan: Any, *_: object, **__: object) -> None:
-        carried_out.append(plan)
-        raise Carried
-
-    monkeypatch.setattr(run, "replay_and_judge", refuse)
-    monkeypatch.setattr(run, "predicted_outcome", lambda *_: "")  # which needs an arm
-    monkeypatch.setattr(run, "predict_success", lambda *_: 1.0)  # so does this
-    spec = TrialConfig("carried_bridge", noise_mm=1.5, noise_deg=0.5, noise=name, method="uncorrected", seed=5)
-    with pytest.raises(Carried):
-        run.run_trial(spec, scene, simulated=simulated, content="any")
-    expected = make_noise(name, NoiseLevel(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
-    assert expected.observed.all()
-    assert carried_out[0].goals.tobytes() == expected.poses.tobytes()
-    assert carried_out[0].targets.tobytes() == expected.poses.tobytes()
-    assert np.abs(expected.poses - layout.poses).max() > 1e-4
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
-    """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
-    simulated = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
-    for seed in range(40):
-        seen = observe_demonstration(simulated, make_noise(name, NOISE_LEVEL), seed)
-        planned = apply_method("uncorrected", seen, CYCLE.goals)
-        if seen.observed.all():
-            assert planned.plan is not None
-            assert planned.plan.target_poses.tobytes() == seen.poses.tobytes()
-        else:
-            assert planned.plan is None
-            assert planned.failure is not None
-            assert planned.failure.code == "not_seen"
-            assert planned.failure.operation == int(np.argmin(seen.observed))
-            assert not apply_method("contact", seen, CYCLE.goals).plan
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_large_errors_stay_within_the_observations_of_the_environment(name: str) -> None:
-    """At level 40; positions of gross outliers are given at the wall of the room."""
-    widest = np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)
-    for seed in range(60):
-        seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(40.0, 40.0)), np.random.default_rng(seed))
-        assert (np.abs(seen.covariance) <= widest).all()
-        goals = packed(seen.poses)
-        assert np.abs(goals[:, :3]).max() <= ROOM_M
-        near = np.abs(seen.poses[:, :3, 3]).max(axis=1) <= ROOM_M
-        assert_allclose(goals[near], pose.pack(seen.poses[near]), atol=1e-15)

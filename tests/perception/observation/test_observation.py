@@ -83,7 +83,6 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     ("given", "noise_level", "message"),
     [
         ("isotropc", NoiseLevel(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        ("here/mine.csv", NoiseLevel(1, 1), "did you mean 'empirical:here/mine.csv'"),
         ("isotropic", NoiseLevel(1, float("nan")), "noise level nan degrees is not possible"),
         (lambda goals: goals, NoiseLevel(1, 1), "cannot be called with (assembly, shown, rng)"),
         (object, NoiseLevel(1, 1), "the noise model 'object' failed"),
@@ -106,7 +105,7 @@ SKEWED[1, 0, 1] = 1e-7
         (TOWER.goals, "returned ndarray; return an apo_bench.assembly.Observation"),
         (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
         (replace(GOOD, start={}), "changed which parts have a start pose"),
-        (replace(GOOD, poses=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),
+        (replace(GOOD, poses=1.1 * TOWER.goals), "pose of operation 1 that is not rigid"),
         (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
     ],
 )

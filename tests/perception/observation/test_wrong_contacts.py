@@ -6,24 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
-from apo_bench import Assembly, InputError, Observation, TrialConfig, load_scenario
+from apo_bench import Assembly, InputError, load_scenario
 from apo_bench.assembly import Contact, relation_graph
 from apo_bench.assembly.equations import equations
 from apo_bench.perception.observation.wrong_contacts import (
     NEAR_FACES_M,
     TOUCHING_M,
     Shifted,
-    contact_source_name,
     culprit,
     false,
     make_contacts,
     missed,
     with_contacts,
 )
-from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import ARM, CONTACT_SOURCE, DEMONSTRATION, LAYOUT, OBSERVATION, stream
+from apo_bench.trial.stages import CONTACT_SOURCE, stream
 from tests import scenes
 
 SEEDS = range(4)
@@ -98,78 +96,12 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
     assert culprit(scene.assembly, scene.assembly) is None
 
 
-def test_shared_faces_are_shifted_for_one_contact_only() -> None:
-    """The table's top carries three blocks of Fig. 6; two of them keep it where it is."""
-    scene = scenes.pockets()
-    for seed in range(40):
-        wrong = Shifted()(scene.assembly, scene.start, scene.goals, stream(seed, CONTACT_SOURCE))
-        ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
-        if contact.environment.part == "table" and contact.environment.face == "top_shifted":
-            assert sum(r.contact.environment.face == "top" for r in wrong.relations()) == 3
-            assert_array_equal(
-                wrong.solids["table"].faces["top"].outline, scene.assembly.solids["table"].faces["top"].outline
-            )
-            return
-    raise AssertionError("no seed shifts the table's top")
-
-
-def test_a_plan_has_the_relations_that_its_planner_was_given() -> None:
-    scene = scenes.stick_in_tower()
-    seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 1.0, 1.0))
-    wrong = with_contacts(seen, Shifted(3e-3), scene.goals, stream(4, CONTACT_SOURCE))
-    assert wrong.poses.tobytes() == seen.poses.tobytes()
-    for method in ("oracle", "uncorrected"):
-        with_wrong = apply_method(method, wrong, scene.goals)
-        without = apply_method(method, seen, scene.goals)
-        assert with_wrong.plan is not None
-        assert without.plan is not None
-        assert with_wrong.plan.target_poses.tobytes() == without.plan.target_poses.tobytes()
-    heard: list[Observation] = []
-
-    def listens(observation: Observation) -> object:
-        heard.append(observation)
-        return observation.poses
-
-    plan = apply_method(listens, wrong, scene.goals)
-    assert heard == [wrong]
-    assert plan.plan is not None
-    assert plan.plan.assembly is wrong.assembly
-
-
-def test_the_stream_is_its_own() -> None:
-    assert len({LAYOUT, DEMONSTRATION, OBSERVATION, ARM, CONTACT_SOURCE}) == 5
-    assert (LAYOUT, DEMONSTRATION, OBSERVATION, ARM) == (0, 1, 2, 3)
-
-
-@pytest.mark.parametrize(
-    ("given", "name"),
-    [("given", "given"), ("shifted", "shifted:2"), ("shifted:3.0", "shifted:3"), ("shifted:0.5", "shifted:0.5")],
-)
-def test_rows_spell_relations_one_way(given: str, name: str) -> None:
-    assert contact_source_name(given) == TrialConfig("stick_in_tower", contact_source=given).relations == name
-
-
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
     assert make_contacts("given") is None
     assert make_contacts("false-negative") is missed
     assert make_contacts("apo_bench.perception.observation.wrong_contacts:false") is false
     assert make_contacts("shifted:3") == Shifted(3e-3)
     assert make_contacts(Shifted(1e-3)) == Shifted(1e-3)
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ("mised", "did you mean 'false-negative'"),
-        ("shifted:far", "a size above 0 and up to 50 mm is allowed"),
-        ("shifted:-1", "a size above 0 and up to 50 mm is allowed"),
-        (7, "are no function; give (assembly, start, goals, rng) -> Assembly"),
-    ],
-)
-def test_what_make_relations_refuses(given: object, words: str) -> None:
-    with pytest.raises(InputError) as refused:
-        make_contacts(given)
-    assert words in str(refused.value)
 
 
 def test_relations_change_nothing_but_contacts_and_faces() -> None:

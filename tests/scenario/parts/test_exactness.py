@@ -210,9 +210,3 @@ def test_moments_of_arcs_are_those_of_many_corners():
         assert exact.first == pytest.approx([(x + u) @ c / 6, (y + v) @ c / 6], rel=1e-7)
         assert exact.second[0, 0] == pytest.approx((x * x + x * u + u * u) @ c / 12, rel=1e-7)
         assert exact.second[0, 1] == pytest.approx((x * v + 2 * x * y + 2 * u * v + u * y) @ c / 24, rel=1e-6)
-
-
-def test_there_are_few_pieces():
-    assert len(extrude(round_corners(rectangle(40, 30), 5), 0, 10).pieces) == 1
-    assert len(extrude(rectangle(40, 30), 0, 10, holes=[rectangle(10, 10)]).pieces) <= 5
-    assert len(extrude(rectangle(40, 30), 0, 9, bores=[bore((0, 0), 4, 0, 9, sides=8)]).pieces) <= 12

@@ -57,11 +57,9 @@ def test_the_part_loads_with_its_matter(part: Path) -> None:
 OUTLINE = r"(?s)(\[faces\.nx\].*?)outline_mm = .*?\n"
 FACES = {
     "another schema": (r"part/1", "part/9", '"apo-bench/part/1" is needed'),
-    "another volume": (r"volume_mm3 = .*", "volume_mm3 = 17000.0", "volume_mm3: 17000 is stated"),
     "a centroid elsewhere": (r"centroid_mm = .*", "centroid_mm = [1, 0, 5]", "centroid_mm: that of the pieces is"),
     "an inertia in other units": (r"inertia_mm5 = .*", "inertia_mm5 = [1, 1, 1, 0, 0, 0]", "inertia_mm5: that of"),
-    "much friction": (r"friction = .*", "friction = 99", "friction: 1 to 3 numbers"),
-    "a name with a dot": (r"\[faces\.top\]", '[faces."top.most"]', "letters, digits and underscores"),
+    "much friction": (r"friction = .*", "friction = 99", "friction: a number <= 10.0 is needed"),
     "another kind": (r'kind = "plane"', 'kind = "torus"', '"plane" or "cylinder" or "cone" or "rim" is needed'),
     "off its plane": (
         OUTLINE,
@@ -73,29 +71,10 @@ FACES = {
         r"\1outline_mm = [[-20, -20, 0], [-20, -20, 11], [-20, 20, 11], [-20, 20, 0]]" + "\n",
         "no side of a piece lies below the face",
     ),
-    "no hole where the pin stands": (
-        r"(?s)(\[faces\.top\].*?)holes_mm = .*?\n",
-        r"\1",
-        "no side of a piece lies below",
-    ),
-    "a wider bore": (r"radius_mm = 3\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
-    "a narrower bore": (r"radius_mm = 3\n", "radius_mm = 2.95\n", "pieces lie along 0% of the wall"),
+    "a wider bore": (r"radius_mm = 3.0\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
     "a bore that is a shaft": (r"(?s)(\[faces\.bore\].*?)hole = true", r"\1hole = false", "pieces have a side"),
-    "a tilted axis": (r"axis = \[0, 0, 1\]", "axis = [0, 0.01, 1]", "mm is stated"),
-    "a span from end to start": (r"span_mm = \[10, 21\]", "span_mm = [21, 10]", "a start and an end"),
     "half a turn of nothing": (r"hole = true", "hole = true\nextent_deg = 180", "extent_deg below 360 and toward"),
-    "a steeper cone": (r"radii_mm = \[4, 3\]", "radii_mm = [4, 3.2]", "of the wall"),
-    "a face twice": (
-        r"\Z",
-        '\n[faces.again]\nkind = "plane"\noutline_mm = [[-20, -20, 0], [-20, -20, 10], [-20, 20, 10], [-20, 20, 0]]\n',
-        "the face lies on 'nx'",
-    ),
-    "a wall twice": (
-        r"\Z",
-        '\n[faces.again]\nkind = "cylinder"\nat_mm = [10, 0, 0]\naxis = [0, 0, 1]\nradius_mm = 4\n'
-        "span_mm = [12, 20]\nhole = false\n",
-        "the face lies on 'pin'",
-    ),
+    "a steeper cone": (r"radii_mm = \[4.0, 3.0\]", "radii_mm = [4, 3.2]", "of the wall"),
 }
 
 
@@ -110,16 +89,10 @@ def test_what_is_stated_must_be_so(case: str, part: Path) -> None:
 
 
 PIECES = {
-    "no corners": (r' vertex="[^"]*"', "", "needs a mesh with vertex="),
-    "three corners": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0"', "needs 4 corners"),
     "a flat piece": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 1 1 0"', "is flat"),
     "a corner twice": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 0 0 0"', "has a corner twice"),
     "a corner inside": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 .1 .1 .1"', "is not convex: its corner 5"),
-    "a mesh of two geoms": (r'mesh="p2"', 'mesh="p1"', "each mesh belongs to one geom"),
     "a wide cylinder": (r'size="0.004 ', 'size="0.4 ', "has a radius of 0.4 m; 0.1 is the most"),
-    "a turned mesh": (r'mesh="p2"', 'mesh="p2" zaxis="1 0 0"', "has zaxis=, which only a cylinder has"),
-    "a cylinder along nothing": (r'zaxis="0 0 1"', 'zaxis="0 0 0"', "has a zaxis= of no length"),
-    "a site": (r"</body>", '<site name="s" pos="0 0 0"/></body>', "sites name faces of boxes alone"),
     "a piece far away": (r'type="cylinder" pos="[0-9.]* ', 'type="cylinder" pos="0.5 ', "separate solids"),
 }
 
@@ -136,13 +109,6 @@ def test_pieces_must_be_convex_and_one(case: str, part: Path) -> None:
 def test_the_file_beside_it_must_be_there(part: Path) -> None:
     part.with_suffix(".toml").unlink()
     assert "the file that states the faces of a part" in refusal(part)
-
-
-def test_beside_boxes_alone_any_file_may_lie(tmp_path: Path) -> None:
-    path = write_part("step", extrude(rectangle(40, 40), 0, 10, top="top"), tmp_path, source="a test", licence="none")
-    assert not path.with_suffix(".toml").exists()
-    path.with_suffix(".toml").write_text("a scenario, perhaps", encoding="utf-8")
-    assert "top" in load_part(path).faces
 
 
 def stl(triangles: np.ndarray) -> bytes:
@@ -180,34 +146,6 @@ def test_a_picture_is_shown_and_never_collides(part: Path, tmp_path: Path) -> No
     names = [model.geom(i).name for i in range(model.ngeom) if model.geom_group[i] < 3]
     assert [name for name in names if name.startswith("thing/")] == ["thing/looks"]
     assert model.body("thing/").subtreemass == pytest.approx(2700.0 * load_part(part).volume, rel=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("geom", "raw", "words"),
-    [
-        (PICTURE, None, "cannot read the picture looks.stl"),
-        (PICTURE, b"solid looks\nendsolid looks\n" + bytes(200), "cannot read the picture looks.stl"),
-        (PICTURE, stl(TRIANGLES)[:-1], "cannot read the picture looks.stl"),
-        (PICTURE.replace('mesh="looks"', 'mesh="p1"'), stl(TRIANGLES), "each mesh belongs to one geom"),
-        (PICTURE + PICTURE.replace('"looks"', '"again"', 1), stl(TRIANGLES), "2 geoms never collide"),
-        (PICTURE.replace(' contype="0" conaffinity="0"', ""), stl(TRIANGLES), "needs a mesh with vertex="),
-    ],
-)
-def test_a_picture_that_is_none_is_refused(geom: str, raw: bytes | None, words: str, part: Path) -> None:
-    with_picture(part, geom)
-    if raw is not None:
-        (part.parent / "looks.stl").write_bytes(raw)
-    assert words in refusal(part)
-
-
-def test_pieces_of_many_sides_are_refused(part: Path) -> None:
-    rng = np.random.default_rng(0)
-    ball = rng.normal(size=(600, 3))
-    ball *= 0.004 / np.linalg.norm(ball, axis=1)[:, None]
-    text = part.read_text(encoding="utf-8")
-    corners = " ".join(f"{x:.9f}" for x in ball.ravel())
-    part.write_text(re.sub(r'vertex="[^"]*"', f'vertex="{corners}"', text, count=1), encoding="utf-8")
-    assert "more than 330 sides or 200 directions" in refusal(part)
 
 
 def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) -> None:

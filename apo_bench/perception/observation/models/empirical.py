@@ -8,7 +8,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates
-from apo_bench.errors import InputError, require
+from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io import CsvRow, read_csv
 from apo_bench.perception.observation.models.camera import Camera
@@ -102,34 +102,21 @@ def empirical_noise(path: Path, noise_level: NoiseLevel) -> Empirical:
     Raises:
         InputError: Anything in the file that is not as described, with the line where it stands.
     """
-    try:
-        state = path.stat()
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: the file of residuals cannot be read; check the path behind 'empirical:'."
-        ) from error
-    return Empirical(_read_once(path, state.st_mtime_ns, state.st_size), noise_level)
+    return Empirical(_read_once(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
 
 
 def residuals_text(residuals: Residuals) -> str:
     """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
     every = -(-len(residuals.where) // MOST_RESIDUALS)
     lines = [",".join(_COLUMNS)]
+    kinds = np.select(
+        [~residuals.found, ~residuals.inlier, ~residuals.turn_known], [_MISSED, _OUTLIER, _TURNED], default=_INLIER
+    )
     for k in range(0, len(residuals.where), every):
-        kind = _kind_of(residuals, k)
         numbers = np.concatenate([residuals.shift_mm[k], residuals.turn_deg[k]])
-        cells = [""] * 6 if kind == _MISSED else [f"{x:.3f}" for x in numbers]
-        lines.append(",".join([*map(str, residuals.where[k].tolist()), kind, *cells]))
+        cells = [f"{x:.3f}" for x in numbers] if residuals.found[k] else [""] * 6
+        lines.append(",".join([*map(str, residuals.where[k].tolist()), kinds[k], *cells]))
     return "\n".join(lines) + "\n"
-
-
-def _kind_of(residuals: Residuals, k: int) -> str:
-    """What became of one part."""
-    if not residuals.found[k]:
-        return _MISSED
-    if not residuals.inlier[k]:
-        return _OUTLIER
-    return _INLIER if residuals.turn_known[k] else _TURNED
 
 
 def read_residuals(path: str | Path) -> Sample:
@@ -154,7 +141,7 @@ def read_residuals(path: str | Path) -> Sample:
 
 
 @lru_cache(maxsize=8)
-def _read_once(path: Path, _changed: int, _size: int) -> Sample:
+def _read_once(path: Path, _changed: int) -> Sample:
     return read_residuals(path)
 
 

@@ -35,8 +35,8 @@ class FalseViews(NamedTuple):
 
     false: NDArray[np.bool_]
     """(n,)."""
-    goals: Array
-    """(n, 4, 4), where the parts seem to be before any noise, world frame, [m]; the true goals where nothing is."""
+    poses: Array
+    """(n, 4, 4), where the parts seem to be before any noise, world frame, [m]; the true poses where nothing is."""
 
 
 class Failure(NamedTuple):
@@ -106,7 +106,7 @@ class CameraFailures:
         before = self.draw_false(demonstration, first)
         now = self.draw_false(demonstration, rng)
         repeated = before.false & (rng.random(len(assembly)) < self.repeat)
-        goals = np.where(repeated[:, None, None], before.goals, now.goals)
+        goals = np.where(repeated[:, None, None], before.poses, now.poses)
         return self._observe(demonstration, rng, FalseViews(repeated | now.false, goals))
 
     def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
@@ -119,8 +119,8 @@ class CameraFailures:
 
     def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
         sigma = self.noise_level.sigma()
-        xi = rng.standard_normal((len(views.goals), 6)) * sigma
-        seeming = replace(demonstration, poses=views.goals)
+        xi = rng.standard_normal((len(views.poses), 6)) * sigma
+        seeming = replace(demonstration, poses=views.poses)
         seen = observe_displaced(demonstration.assembly, seeming, xi, np.diag(sigma**2))
         x, y, z = self.camera.T_world_camera[:3, 3].tolist()
         gross = min(1.0, sum(failure.rate for failure in self.failures))

@@ -5,7 +5,7 @@ from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude
 from apo_bench.scenario.parts.making.frustums import Frustum
 from apo_bench.scenario.parts.making.outline import Edge, Outline, circle, polygon, rectangle, round_corners, slot
 from apo_bench.scenario.parts.making.revolve import revolve, shaft
-from apo_bench.scenario.parts.making.writing import quoted, solid_of, write_part
+from apo_bench.scenario.parts.making.writing import solid_of, write_part
 
 __all__ = [
     "Body",
@@ -18,7 +18,6 @@ __all__ = [
     "extrude",
     "join",
     "polygon",
-    "quoted",
     "rectangle",
     "revolve",
     "round_corners",

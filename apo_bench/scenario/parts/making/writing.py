@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
-from apo_bench.io import write_file
+from apo_bench.io import toml_text, write_file
 from apo_bench.scenario.parts.allowed import THINNEST_M, is_name
 from apo_bench.scenario.parts.making.body import Body
 from apo_bench.scenario.parts.stated import PART_SCHEMA
@@ -162,53 +162,48 @@ def _inside(face: Face) -> Array:
 def stated_text(
     solid: Solid, density: float, friction: Sequence[float], source: str, licence: str, title: str = ""
 ) -> str:
-    """The text of `NAME.toml`."""
+    """Return the text of `NAME.toml`."""
     assert solid.inertia is not None
     six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    lines = [
-        f'schema = "{PART_SCHEMA}"',
-        *([f"title = {quoted(title)}"] if title else []),
-        f"source = {quoted(source)}",
-        f"licence = {quoted(licence)}",
-        f"density = {float(density)!r}",
-        f"friction = {_list(friction)}",
-        f"volume_mm3 = {1e9 * solid.volume:.12g}",
-        f"centroid_mm = {_list(1e3 * solid.centroid)}",
-        "inertia_mm5 = [" + ", ".join(f"{x:.12g}" for x in six) + "]  # xx, yy, zz, xy, xz, yz",
-    ]
-    for flat in solid.faces.values():
-        lines += ["", f"[faces.{flat.name}]", 'kind = "plane"', f"outline_mm = {_rows(flat.outline)}"]
-        if flat.holes:
-            lines.append("holes_mm = [" + ", ".join(map(_rows, flat.holes)) + "]")
-        lines += ["fit = true"] * flat.fit
-    for wall in solid.rounds.values():
-        lines += ["", *_round_lines(wall)]
-    return "\n".join(lines) + "\n"
-
-
-def _round_lines(wall: RoundFace) -> list[str]:
-    part = wall.toward is not None and wall.extent_rad < WHOLE_TURN
-    radii = ("radii_mm", _list(1e3 * np.array(wall.radii)))
-    said = {
-        "kind": f'"{wall.kind}"',
-        "at_mm": _list(1e3 * wall.point),
-        "axis": _list(wall.axis, 12),
-        **dict([radii if wall.kind == "cone" else ("radius_mm", _number(1e3 * wall.radius, 9))]),
-        "span_mm": _list(1e3 * np.array(wall.span)) if wall.kind != "rim" else "",
-        "hole": str(wall.hole).lower(),
-        "fit": "true" if wall.fit else "",
-        "extent_deg": _number(np.degrees(wall.extent_rad), 9) if part else "",
-        "toward": _list(wall.toward, 12) if part and wall.toward is not None else "",
+    document = {
+        "schema": PART_SCHEMA,
+        "title": title,
+        "source": source,
+        "licence": licence,
+        "density": float(density),
+        "friction": list(map(float, friction)),
+        "volume_mm3": float(f"{1e9 * solid.volume:.12g}"),
+        "centroid_mm": _list(1e3 * solid.centroid),
+        "inertia_mm5": [float(f"{x:.12g}") for x in six],
+        "faces": {face.name: _plane_table(face) for face in solid.faces.values()}
+        | {wall.name: _round_table(wall) for wall in solid.rounds.values()},
     }
-    return [f"[faces.{wall.name}]", *(f"{key} = {value}" for key, value in said.items() if value)]
+    return toml_text(document)
 
 
-def _rows(points: Array) -> str:
-    return "[" + ", ".join(_list(1e3 * point) for point in points) + "]"
+def _plane_table(face: Face) -> dict[str, Any]:
+    table = {"kind": "plane", "outline_mm": _list(1e3 * face.outline)}
+    holes = {"holes_mm": [_list(1e3 * hole) for hole in face.holes]} if face.holes else {}
+    return table | holes | {"fit": face.fit}
 
 
-def _list(values: Iterable[float], digits: int = 9) -> str:
-    return "[" + ", ".join(_number(x, digits) for x in values) + "]"
+def _round_table(wall: RoundFace) -> dict[str, Any]:
+    table: dict[str, Any] = {"kind": wall.kind, "at_mm": _list(1e3 * wall.point), "axis": _list(wall.axis, 12)}
+    table["hole"] = wall.hole
+    if wall.kind == "cone":
+        table["radii_mm"] = _list(1e3 * np.array(wall.radii))
+    else:
+        table["radius_mm"] = round(1e3 * wall.radius, 9)
+    if wall.kind != "rim":
+        table |= {"span_mm": _list(1e3 * np.array(wall.span)), "fit": wall.fit}
+    if wall.toward is not None and wall.extent_rad < WHOLE_TURN:
+        table |= {"extent_deg": round(float(np.degrees(wall.extent_rad)), 9), "toward": _list(wall.toward, 12)}
+    return table
+
+
+def _list(values: Array, digits: int = 9) -> Any:
+    """Return numbers as nested lists."""
+    return np.vectorize(lambda x: round(float(x), digits) + 0.0, otypes=[float])(values).tolist()
 
 
 def _words(values: Iterable[float]) -> str:
@@ -218,8 +213,3 @@ def _words(values: Iterable[float]) -> str:
 def _number(x: float, digits: int) -> str:
     text = f"{x:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
-
-
-def quoted(text: str) -> str:
-    """A text as a TOML file has it."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'

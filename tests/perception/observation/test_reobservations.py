@@ -27,10 +27,10 @@ def looks(allowed, noise="isotropic", assembly=None):
 def test_what_was_not_asked_for_is_not_seen():
     look = looks(2)
     seen = look((3, 0, 3))
-    assert seen.seen.tolist() == [True, False, False, True, False]
+    assert seen.observed.tolist() == [True, False, False, True, False]
     assert (look.left, look.reobservations) == (1, 2)
     assert (seen.play_m, seen.assembly) == (2e-4, demonstration().assembly)
-    assert look([4]).seen.tolist() == [False, False, False, False, True]
+    assert look([4]).observed.tolist() == [False, False, False, False, True]
     assert (look.left, look.reobservations) == (0, 3)
 
 
@@ -40,17 +40,17 @@ def test_a_look_does_not_depend_on_what_was_asked_before():
     one([0])
     other([1, 2, 3])
     second = one([4])
-    np.testing.assert_array_equal(second.goals[4], other([0, 4]).goals[4])
-    assert not np.array_equal(second.goals[4], looks(1)([4]).goals[4])
+    np.testing.assert_array_equal(second.poses[4], other([0, 4]).poses[4])
+    assert not np.array_equal(second.poses[4], looks(1)([4]).poses[4])
 
 
 def test_a_look_may_miss_and_err_as_the_first():
     look = looks(100, "outliers")
     observations = [look(range(N)) for _ in range(100)]
-    missed = np.mean([~seen.seen for seen in observations])
+    missed = np.mean([~seen.observed for seen in observations])
     assert 0.0 < missed < 0.06  # 2 % of 500; 0.06 is 6 deviations above
     away = [
-        np.linalg.norm(seen.poses[seen.seen][:, :3, 3] - demonstration().goals[seen.seen][:, :3, 3])
+        np.linalg.norm(seen.poses[seen.observed][:, :3, 3] - demonstration().poses[seen.observed][:, :3, 3])
         for seen in observations
     ]
     assert max(away) > 5 * np.median(away)
@@ -72,5 +72,5 @@ def test_a_look_at_what_is_not_there_is_refused_and_costs_nothing(asked):
 def test_no_more_looks_than_allowed():
     with pytest.raises(InputError, match=r"none is left; ask `look\.left` before"):
         looks(0)([0])
-    with pytest.raises(InputError, match="a number of looks of -1 was given"):
+    with pytest.raises(InputError, match="a number of reobservations of -1 was given"):
         looks(-1)
