@@ -20,11 +20,11 @@ from apo_bench.simulation.scene import Scene
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
 _HIGH_M = 0.35
-"""Height at which errors are looked at, where the arm reaches it; else at that of its home."""
+"""Height at which errors are measured where the arm reaches it, else the height of its home."""
 _AHEAD_M = 0.25
 """Farther ahead of its base than this: a line beside its axis turns it fast."""
-WAY_M = 0.15
-"""Length of the way along which they are looked at."""
+STRETCH_M = 0.15
+"""Length of the line along which the errors are measured."""
 STAND_S = 0.3
 """How long the arm stands before it."""
 _RESTS_M = 2e-5  # the tip rests when it is this near to its command
@@ -56,8 +56,8 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     try:
         with robot.watch_stability():
             rise(robot, SPEEDS[-1])
-            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+            length = STRETCH_M if speed > SPEEDS[0] else STRETCH_M / 10
+            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), length), speed)
             return error_on(line, trace(robot, line), speed)
     except ExecutionAborted:
         return None
@@ -100,13 +100,13 @@ def rise(robot: Robot, speed: float) -> None:
 
 def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
     """Of where the tip was at each step, (n, 4, 4): beside the line, along it behind the command, and turned."""
-    way = line.end[:3, 3] - line.start[:3, 3]
-    way = way / np.linalg.norm(way)
+    direction = line.end[:3, 3] - line.start[:3, 3]
+    direction = direction / np.linalg.norm(direction)
     n = len(tips)
     commanded = line.poses(line.progress(np.arange(1, n + 1) / n))
     off = tips[:, :3, 3] - commanded[:, :3, 3]
-    along = off @ way
-    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
+    along = off @ direction
+    beside = np.linalg.norm(off - along[:, None] * direction, axis=1)
     # The trace of R_commanded^T R is 1 + 2 cos(angle between them).
     turned = np.einsum("nij,nij->n", tips[:, :3, :3], commanded[:, :3, :3])
     angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))

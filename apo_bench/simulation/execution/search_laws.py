@@ -32,15 +32,15 @@ class _Felt:
     """The force on the part, averaged: called once a physics step."""
 
     def __init__(self, guard: Guard, step_s: float) -> None:
-        self._way = guard.way.tolist()
+        self._direction = guard.direction.tolist()
         self._step_s = step_s
         self._averaged = LowPass(_FELT_S)
 
     def __call__(self, force: Sequence[float]) -> tuple[float, list[float]]:
         """How hard it is pushed back, [N], and the rest of the force, across, (3,), [N]."""
         averaged = self._averaged(force, self._step_s)
-        push = -sum(f * w for f, w in zip(averaged, self._way, strict=True))
-        return push, [f + push * w for f, w in zip(averaged, self._way, strict=True)]
+        push = -sum(f * w for f, w in zip(averaged, self._direction, strict=True))
+        return push, [f + push * w for f, w in zip(averaged, self._direction, strict=True)]
 
 
 class Spiral:
@@ -60,9 +60,9 @@ class Spiral:
         self.radius = radius
         self.deep = deep
         self.step_s = step_s
-        first = np.cross((0.0, 0.0, 1.0) if abs(guard.way[2]) < 0.5 else (0.0, 1.0, 0.0), guard.way)
+        first = np.cross((0.0, 0.0, 1.0) if abs(guard.direction[2]) < 0.5 else (0.0, 1.0, 0.0), guard.direction)
         first /= np.linalg.norm(first)
-        self._axes = np.array([first, np.cross(guard.way, first)])
+        self._axes = np.array([first, np.cross(guard.direction, first)])
         self._felt = _Felt(guard, step_s)
         self._ahead = 0.0
         self._speed = 0.0
@@ -95,7 +95,7 @@ class Spiral:
         else:
             self._speed = min(max(self._speed, 0.0) + self.step_s * _SOFT, _FEED)
         self._ahead += self.step_s * self._speed
-        return self.aside + self._ahead * self.guard.way
+        return self.aside + self._ahead * self.guard.direction
 
 
 class Easing:
@@ -119,5 +119,5 @@ class Easing:
         ahead = min(self.step_s * _EASE, self.length - self._ahead)
         across = self.step_s * _YIELD * np.array(side)
         self._ahead = self._ahead + ahead
-        self._offset = self._offset + across + ahead * self.guard.way
+        self._offset = self._offset + across + ahead * self.guard.direction
         return self._offset

@@ -38,7 +38,7 @@ class SideTouch(NamedTuple):
 
     T: Array
     """Where the part is when the motion begins, (4, 4), world."""
-    way: Array
+    direction: Array
     """Unit vector, (3,), world: into the wall, along which the pads do not give way."""
     point: Array
     """What touches, (3,), in the frame of the part, [m]."""
@@ -124,7 +124,7 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
     tip = place.T @ grip.T_part_tip
     above = np.arange(0.0, t.safe, _LOOKS_M)[:, None] * UP
     aside = _ROOM_M * np.cross(UP, place.normal)
-    into = (STAND_OFF_M + _ROOM_M) * place.way
+    into = (STAND_OFF_M + _ROOM_M) * place.direction
     whole = np.vstack([above + aside, above - aside, into + aside, into - aside])
     R = place.T[:3, :3]
     for each, shifts in ((wall, above), *((other, whole) for other in others)):

@@ -90,7 +90,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
         wrist.end_zero()
 
 
-def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: WristSensor) -> float | None:
+def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist: WristSensor) -> float | None:
     """Follow a line until the filtered force against `way` passes `newton`, and stop there at once.
 
     The arm goes on while the sensor lags behind by its time constant. At 2 mm/s the blow of a first touch stays below
@@ -99,7 +99,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
     stops it.
 
     Args:
-        way: The direction of pressing, a unit vector, (3,), world.
+        direction: The direction of pressing, a unit vector, (3,), world.
 
     Returns:
         What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
@@ -109,7 +109,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
         ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
     """
     with reading(robot, wrist):
-        return robot.follow(line, Guard(way, newton)) or None
+        return robot.follow(line, Guard(direction, newton)) or None
 
 
 def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
@@ -152,7 +152,7 @@ def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
     to = pose.at(about)
     T_point_tip = pose.inverse(to) @ T
     turns = []
-    for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
-        ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
+    for twists, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
+        ends = [(to @ pose.exp(-by * unit) @ T_point_tip, to @ pose.exp(by * unit) @ T_point_tip) for unit in twists]
         turns.append(robot.reached(joint_gradients(robot.scene.kinematics, ends, q, by)))
     return np.vstack(turns)

@@ -323,7 +323,7 @@ class Robot:
             mujoco.mj_step(model, data)
             return 0
         step_s = float(model.opt.timestep)
-        a, b, c = (0.0, 0.0, 0.0) if guard is None else guard.way.tolist()
+        a, b, c = (0.0, 0.0, 0.0) if guard is None else guard.direction.tolist()
         newton = math.inf if guard is None else guard.newton
         for steps, command in enumerate(commands, start=1):
             data.ctrl[:] = command

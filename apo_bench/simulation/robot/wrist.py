@@ -196,7 +196,7 @@ class WristSensor:
         """Whether the hand is pushed back along the way of a guard by more than it allows."""
         if guard is None:
             return False
-        return -float(self.wrench(np.zeros(3))[:3] @ guard.way) > guard.newton
+        return -float(self.wrench(np.zeros(3))[:3] @ guard.direction) > guard.newton
 
     def _sensor(self) -> Array:
         """Where the sensor is by the encoders, (4, 4), world."""

@@ -45,7 +45,7 @@ class TouchPlace(NamedTuple):
 
     T_world_tip: Array
     """Where the motion begins, (4, 4), [m]."""
-    way: Array
+    direction: Array
     """Unit vector, (3,), world: into the face."""
     patch: Array
     """Corners of what touches, (k, 3), in the frame of the tip, [m]: of a hand that is tilted one of them does."""

@@ -69,11 +69,11 @@ class ProbingState:
         """The force that ends a touch, [N]: well above what the sensor shows of nothing."""
         return touch_guard(self.wrist.sigma[0])
 
-    def off_m(self, robot: Robot, T_world_tip: Array, way: Array) -> float:
+    def off_m(self, robot: Robot, T_world_tip: Array, direction: Array) -> float:
         """How far the tip may be off along a direction, (3,) world, [m]: three standard deviations of its estimate."""
         covariance = self.estimate.covariance_of(T_world_tip, self.jacobian(robot))[:3, :3]
-        way = T_world_tip[:3, :3].T @ way
-        return _OFF_SIGMAS * float(np.sqrt(way @ covariance @ way))
+        direction = T_world_tip[:3, :3].T @ direction
+        return _OFF_SIGMAS * float(np.sqrt(direction @ covariance @ direction))
 
     def plane_by_camera(self, normal: Array, point: Array) -> tuple[Array, float]:
         """A plane of the frame that the arm takes for the world, by normal, (3,), and offset, [m], in the camera's."""
