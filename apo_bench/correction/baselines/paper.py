@@ -1,7 +1,6 @@
 """The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
 
-from apo_bench.assembly import Correction, Observation, largest
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Observation, contact_equations, largest
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
@@ -18,7 +17,7 @@ def paper(observation: Observation) -> Correction:
     """
     if not observation.observed.all():
         return refused_correction(observation)
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)

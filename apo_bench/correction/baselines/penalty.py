@@ -16,8 +16,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Equations, Observation, contact_equations
 from apo_bench.correction.baselines.intruding_boxes import Meeting, intruding, meeting
 from apo_bench.correction.checks.as_given import execute_as_it_ends
 from apo_bench.correction.solvers import Whitened
@@ -79,7 +78,7 @@ class Loss:
 
 def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss:
     """The loss of an observation."""
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 

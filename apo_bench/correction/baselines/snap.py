@@ -7,8 +7,7 @@ sense of least squares.
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Equations, Observation, contact_equations
 from apo_bench.correction.checks.as_given import TWIST_UNITS, execute_as_it_ends
 from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, Whitened
 from apo_bench.correction.solvers.whitened import whitened
@@ -32,7 +31,7 @@ def snap(observation: Observation) -> Correction:
 def _snapped(observation: Observation) -> Array:
     poses = np.array(observation.poses)
     space = whitened(observation)
-    system = equations(observation.assembly, observation.start, poses)
+    system = contact_equations(observation.assembly, observation.start, poses)
     for k in range(len(poses)):
         poses[k] = _put(system.among(system.made == k), poses, k, space)
     return poses

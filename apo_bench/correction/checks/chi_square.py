@@ -10,8 +10,7 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from apo_bench.assembly import Assembly
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Assembly, contact_pattern
 from apo_bench.correction.solvers import SMALLEST, plays
 from apo_bench.geometry import Array, frozen, remembered
 
@@ -31,7 +30,7 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
     count, unit_m = plays(assembly, play_m)
-    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(pattern(assembly).begin))
+    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(contact_pattern(assembly).begin))
     return frozen(np.repeat(each, 3))
 
 

@@ -15,8 +15,15 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, faces_away
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import (
+    Consistency,
+    Correction,
+    Observation,
+    OutlierModel,
+    SharedError,
+    contact_pattern,
+    faces_away,
+)
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
@@ -204,7 +211,7 @@ def softened(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArra
     if not dropped:
         return np.zeros(len(soft), dtype=np.bool_), soft
     wrong = np.repeat(~observation.assembly.without(dropped), 3)
-    each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
+    each = np.repeat(np.sqrt(np.diff(contact_pattern(observation.assembly).begin)), 3) * _WRONG_M
     return wrong, np.where(wrong, each, soft)
 
 
