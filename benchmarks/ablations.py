@@ -25,7 +25,7 @@ from apo_bench.assembly import (
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.baselines.track import track_operations
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 from apo_bench.geometry import Array
 
@@ -57,7 +57,7 @@ def no_disappeared(observation: Observation) -> Correction:
     contacts that stand hold; the gaps are those of every contact ever made.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     standing = np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
     system = contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
@@ -106,7 +106,7 @@ def no_history(observation: Observation) -> Correction:
         ever made. `freed` are the operations that got a new motion parameter.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
     poses = _poses(observation, tuple(last))
     end = _end(observation.assembly, tuple(last))

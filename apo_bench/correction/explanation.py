@@ -103,7 +103,7 @@ class Explanation:
 
     assembly: Assembly
     poses: Array
-    """(n, 4, 4), at which it was problem."""
+    """(n, 4, 4), where the contacts were linearised."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
     """The parts that were moved, in the order in which they were placed."""

@@ -10,7 +10,7 @@ CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of oper
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation, contact_equations
-from apo_bench.correction.checks.as_given import execute_as_it_ends
+from apo_bench.correction.checks.as_given import run_method
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -32,7 +32,7 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return execute_as_it_ends(
+    return run_method(
         observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
     )
 
@@ -49,7 +49,7 @@ def _solved(observation: Observation, contact_m: float) -> Array:
 
     def jacobian(z: Array) -> Array:
         _, J = system.linearised(space.poses(z))
-        return np.concatenate([space.pulled(z, J) / contact_m, prior])
+        return np.concatenate([space.pull_back(z, J) / contact_m, prior])
 
     settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
     return space.poses(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)

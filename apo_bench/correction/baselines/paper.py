@@ -3,7 +3,7 @@
 from apo_bench.assembly import Correction, Observation, contact_equations, largest
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 
 
@@ -16,7 +16,7 @@ def paper(observation: Observation) -> Correction:
         candidates; rank and trace are those of their joint solution.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     system = contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))

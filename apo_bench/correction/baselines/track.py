@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Correction, Equations, Iterate, Observation, Step, Try, contact_equations, largest
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import Solution, solve_newton
 from apo_bench.geometry import Array
 
@@ -55,7 +55,7 @@ class TrackedOperation:
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     now = np.array(observation.poses)
     schedule = list[Step]()
     targets = list[Array]()

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation, contact_equations, largest, largest_gap, project_observation
-from apo_bench.correction.checks.status import refused_correction, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, status_sentence
 from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, demanded, least_step, violations
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
@@ -45,7 +45,7 @@ def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()
     return largest(violations(system, exact, inequalities, poses)[observation.assembly.without(dropped)])
 
 
-def execute_as_it_ends(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
+def run_method(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
     """What a method that promises nothing makes of an observation, with the gap that it leaves in the sentence.
 
     Args:
@@ -56,7 +56,7 @@ def execute_as_it_ends(observation: Observation, method: Callable[[Observation],
         As `poses_as_given`, or `not_seen`; what was observed where there is no contact.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     poses = method(observation) if observation.assembly.relations() else observation.poses
     left_m = largest_gap(observation.assembly, observation.start, poses)
     return poses_as_given(observation, poses, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

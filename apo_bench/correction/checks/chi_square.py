@@ -41,7 +41,7 @@ def p_value(chi_square: float, degrees: int) -> float:
     return float(chdtrc(degrees, chi_square)) if degrees else 1.0
 
 
-def softened_chi_square(z: Array, Jt: Array, S: Array) -> Array:
+def soft_chi_square(z: Array, Jt: Array, S: Array) -> Array:
     """The squared length, (b,), of corrections z, (b, 6 n), if equations may be off by covariance S, (3 c, 3 c), [m^2].
 
     Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what

@@ -20,7 +20,7 @@ from apo_bench.correction.solvers import (
     Kernels,
     NearestPoses,
     ProjectedContacts,
-    bounded,
+    bound_contacts,
     compact_equations,
     correction_to,
     fit_covariance,
@@ -168,7 +168,7 @@ def problem_of(
     inequalities = tuple[Inequalities, ...]()
     if not demands.all_exact:
         systems = (contact_equations(assembly, first.start, T) for T in there)
-        inequalities = tuple(bounded(system, demands.exact, demands.low, demands.high) for system in systems)
+        inequalities = tuple(bound_contacts(system, demands.exact, demands.low, demands.high) for system in systems)
     L = np.array([noise_factor(observation) for observation in observations]) if shared else _factors(observations)
     begin = (
         None

@@ -18,7 +18,7 @@ from apo_bench.correction.solvers import (
     LARGEST_DENSE,
     LARGEST_POSTERIOR,
     correction_to,
-    descended,
+    descend_to_nearest,
     nearest_poses,
     project_vertices,
     scales,
@@ -57,7 +57,7 @@ def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
     return problem, first
 
 
-def turned_words(problem: Problem, poses: Array) -> str:
+def describe_turns(problem: Problem, poses: Array) -> str:
     """State which operations were observed turned, if another start was needed to find the corrected poses."""
     if problem.begin is None:
         return ""
@@ -144,4 +144,4 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield poses[i]
         else:
-            yield descended(system.only(int(i)), observation.poses, L, poses[i])
+            yield descend_to_nearest(system.only(int(i)), observation.poses, L, poses[i])
