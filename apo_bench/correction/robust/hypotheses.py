@@ -64,7 +64,7 @@ class Case:
     _merged: dict[tuple[int, State, int | None], Merged] = field(default_factory=dict, init=False, repr=False)
 
     def merge_views(self, k: int, state: State, exchanged: int | None = None) -> Merged:
-        """`views.merge_views` of operation k, each asked once; `exchanged` is the operation whose view belongs to it."""
+        """`views.merge_views` of operation k, once each; `exchanged` is the operation whose view belongs to it."""
         key = k, state, exchanged
         if key not in self._merged:
             other = None if exchanged is None else self.views[exchanged][0]
