@@ -69,7 +69,7 @@ class FittingPlan:
 
 
 @check_arguments
-def fitting_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
+def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
     """What the robot is to do after a correction, with free directions chosen so that it fits.
 
     Args:
