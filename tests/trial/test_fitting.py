@@ -22,8 +22,7 @@ from apo_bench import (
     load_scenario,
     run_trial,
 )
-from apo_bench.assembly import Step
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Step, contact_equations
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -85,7 +84,7 @@ def test_contacts_hold_as_they_did(seed: int) -> None:
     seen = seen_at("carried_bridge", seed)
     correction, found = planned("carried_bridge", seed)
     before, after = (
-        equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
+        contact_equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
     )
     assert before.max() < 1e-9
     assert after.max() < 1e-9
