@@ -20,27 +20,16 @@ from apo_bench.cli.shared import (
     print_table,
     say,
 )
-from apo_bench.errors import require, require_known
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, with_simulated
 
 _EXACT_M = 1e-9  # contacts that hold this well are a solution, at which a rank can be computed
-_DOUBTS = ("apply", "warn", "refuse", "drop")
 
 
 def correct_command(
     scenario: ScenarioArgument,
     observation: Annotated[Path, path_option("Observed poses: .csv, or .json of `run --save-observation`.")],
-    method: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Corrector by name, or package.module:name; default: {CORRECTOR}, or contact with --if-doubtful."
-        ),
-    ] = None,
-    if_doubtful: Annotated[
-        str | None,
-        typer.Option(help="What the corrector contact does if its test fails: apply, warn, refuse or drop."),
-    ] = None,
+    method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     camera_noise: Annotated[
@@ -53,17 +42,16 @@ def correct_command(
 
     Examples:
       apo-bench correct stick_in_tower --observation docs/seen.csv
-      apo-bench correct stick_in_tower --observation docs/seen.csv --if-doubtful drop --out plan.json
+      apo-bench correct stick_in_tower --observation docs/seen.csv --method contact-drop --out plan.json
     """
     from apo_bench import correct
     from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.formats.observation import read_observation_file
     from apo_bench.viz.correct_text import POSE_COLUMNS, SUSPECT_COLUMNS, correction_form, correction_lines
-    from apo_bench.viz.tables import form_table
+    from apo_bench.viz.dof_text import DOF_COLUMNS, dof_rows
+    from apo_bench.viz.form_text import form_table
 
     check_output(out, "--out", ".json", ".csv", inputs=(observation,))
-    method = method or (CORRECTOR if if_doubtful is None else "contact")
-    corrector = _find_corrector(method, if_doubtful)
     observed, task, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
@@ -74,10 +62,10 @@ def correct_command(
         observed = restate(observed, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
-        correction = correct(observed, corrector)
+        correction = correct(observed, with_simulated(method))
     explanation = _explain_solution(observed, correction)
     form = correction_form(task.name, method, observed, correction, explanation, assumed)
-    lines = correction_lines(correction, explanation)
+    lines = correction_lines(form, correction)
     moved, predicted_success = "", None
     if correction.ok:
         plan, moved, predicted_success = plan_correction(task, observed, correction)
@@ -89,11 +77,11 @@ def correct_command(
     if as_json:
         print_json(form | {"moved": moved or None, "predicted_success": predicted_success})
     else:
-        print_columns([("observation", f"{observation} of {task.name}, corrected by {method}"), *lines])
-        for rows, columns in (
-            (form["operations"], POSE_COLUMNS),
-            (form["test"] and form["test"]["suspects"], SUSPECT_COLUMNS),
-        ):
+        print_columns([("observation", str(observation)), *lines])
+        free = explanation and dof_rows(explanation)
+        suspects = form["test"] and form["test"]["suspects"]
+        tables = ((form["operations"], POSE_COLUMNS), (free, DOF_COLUMNS), (suspects, SUSPECT_COLUMNS))
+        for rows, columns in tables:
             if rows:
                 print_table(form_table(rows, columns))
     if out is not None and correction.ok:
@@ -112,15 +100,6 @@ def _explain_solution(observation: Observation, correction: Correction) -> Any:
         return None
     exact = gap_of(observation, correction.poses, correction.dropped) <= _EXACT_M
     return explain(observation, correction) if exact else None
-
-
-def _find_corrector(method: str, doubt: str | None) -> Any:
-    from apo_bench import ContactCorrector
-
-    if doubt is not None:
-        require_known("value of --if-doubtful", doubt, _DOUBTS)
-        require(method == "contact", f"--if-doubtful needs --method contact, got {method}.")
-    return ContactCorrector(doubt or "warn") if method == "contact" else with_simulated(method)  # type: ignore[arg-type]
 
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
