@@ -55,8 +55,8 @@ def no_disappeared(observation: Observation) -> Correction:
     before = system.gaps(observation.poses)
     freed = candidates(without_lost(observation.assembly), ~(before <= observation.gap_m)[standing])
     solution = solve_newton(system.among(standing & system.containing(freed)), observation.poses, freed)
-    status = solver_status(solution, largest(system.gaps(solution.goals)[standing]), observation.gap_m)
-    goals = solution.goals
+    status = solver_status(solution, largest(system.gaps(solution.poses)[standing]), observation.gap_m)
+    goals = solution.poses
     if status == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
             goals = solve_own_contacts(system, goals, k, observation.gap_m)
@@ -105,10 +105,10 @@ def no_history(observation: Observation) -> Correction:
     system = equations(end, observation.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(free)), poses, free)
-    status = solver_status(solution, largest(system.gaps(solution.goals)), observation.gap_m)
+    status = solver_status(solution, largest(system.gaps(solution.poses)), observation.gap_m)
     freed = _main(observation.assembly, last, free)
     goals = np.array(observation.poses)
-    goals[list(freed)] = solution.goals[list(freed.values())]
+    goals[list(freed)] = solution.poses[list(freed.values())]
     return Correction(
         poses=goals,
         status=status,

@@ -21,8 +21,7 @@ SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
 SIZE = (600, 500)
 COLUMNS = 5
 SEED = 0
-AZIMUTH_DEG = {"wedge_under_roof": -35.0}
-"""From where it is looked at, if not from the usual side."""
+AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, if not the usual side
 
 
 def main() -> None:
@@ -38,7 +37,7 @@ def main() -> None:
 
 
 def finished(name: str) -> NDArray[np.uint8]:
-    """What stands on the table when a careful person is done, as large as it fits."""
+    """Return a picture of the finished assembly, as large as it fits."""
     scene = build_scene(load_scenario(name))
     scene.shown.model.vis.headlight.ambient[:] = 0.4
     simulated = simulate_demonstration(scene, 0.0, SEED)

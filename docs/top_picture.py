@@ -1,7 +1,7 @@
-"""The picture at the top: a whole UR5e as seen beside corrected, each with the faces of the hole, seen along the stick.
+"""The picture at the top: a UR5e with observed poses and with corrected ones, each with the hole along the stick.
 
-Both are states of a replay. In the inset the arm and the stick are not drawn; the yellow line is the outline of the
-stick where the hole begins, and red is where its end meets a face of a castle.
+Both are states of a replay. The inset hides the arm and the stick; the yellow line is the outline of the stick at the
+hole entrance, and red is where its end meets a face of a castle.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""The topology of an assembly, and the goals that flow over it, in the words of the paper. No solver, no simulator."""
+"""The topology of an assembly, and the poses that flow over it, in the words of the paper. No solver, no simulator."""
 
+from apo_bench.assembly.contact_kinds import ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.correction_record import (
     Consistency,
     Correction,
@@ -12,16 +13,8 @@ from apo_bench.assembly.correction_record import (
 )
 from apo_bench.assembly.demonstration import Demonstration, Layout
 from apo_bench.assembly.equations import Equations, largest, largest_gap
-from apo_bench.assembly.facing_round import (
-    CONTACT_KINDS,
-    ContactKind,
-    Facing,
-    contact_kind,
-    geometric_play,
-    measure_round,
-    play_mm,
-    round_pairs,
-)
+from apo_bench.assembly.facing import face_gap, faces_oppose, height
+from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
 from apo_bench.assembly.observation import Observation
@@ -31,6 +24,7 @@ from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, poses_in_force,
 from apo_bench.assembly.poses import Poses, placements
 from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
 from apo_bench.assembly.reached import InHand, Outcome, ProbingResult, Reached, ReplayResult, Snapshot
+from apo_bench.assembly.resting_contacts import TouchedContact, corners, mouth, outline_points, touched_contacts
 from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import (
@@ -48,19 +42,8 @@ from apo_bench.assembly.topology import (
     spell,
 )
 from apo_bench.assembly.touch import Touch
-from apo_bench.assembly.touching import (
-    TouchedContact,
-    corners,
-    face_gap,
-    faces_oppose,
-    height,
-    mouth,
-    outline_points,
-    touched_contacts,
-)
 
 __all__ = (
-    "CONTACT_KINDS",
     "ODL",
     "SCHEDULE_REMEDY",
     "Arc",

@@ -1,4 +1,4 @@
-"""What a corrector returns: goals, how the solver ended, and what the test of the correction says; what it may ask."""
+"""What a corrector returns: poses, how the solver ended, and the result of the test of the correction."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Iterate(NamedTuple):
 
 
 class Try(NamedTuple):
-    """One trial of the iterative correction of the paper (its Section 4.2): a solution with some goals free."""
+    """One trial of the iterative correction of the paper (its Section 4.2): a solution with some poses free."""
 
     step: int
     """The operation that had just been observed, counted from 0."""
@@ -85,24 +85,24 @@ class Consistency:
 @copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One explanation of what was seen: what of it is believed, how likely that is, and the goals that follow."""
+    """One explanation of the observation: what of it is taken as right, how likely that is, and its poses."""
 
     weight: float
     """Probability; what all those of a correction leave to 1 is that of none of them."""
     poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array | None
-    """(n, 6, 6), posterior, of the body twist by which each goal may still be wrong, [m, rad]; None if unknown."""
-    believed: Observation
-    """What the goals are the correction of."""
+    """(n, 6, 6), posterior, of the body twist by which each pose may still be wrong, [m, rad]; None if unknown."""
+    assumed: Observation
+    """What the poses are the correction of."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was seen is believed, counted from 0."""
+    """Operations of which nothing that was observed is assumed, counted from 0."""
     dropped: tuple[str, ...] = ()
-    """Relations that are not believed."""
+    """Relations that are not assumed."""
     sentence: str = ""
-    """What is believed in place of what was stated, in words; empty if all is believed as stated."""
+    """What is assumed in place of what was stated, in words; empty if all is assumed as stated."""
     noise_scale: float = 1.0
-    """How much larger than stated the noise is; `covariance` and `believed` count it."""
+    """How much larger than stated the noise is; `covariance` and `assumed` count it."""
 
     def __post_init__(self) -> None:
         freeze(self, poses=(None, 4, 4), covariance=(len(self.poses), 6, 6))
@@ -113,7 +113,7 @@ class Hypothesis:
 @copyable
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """What a corrector returns: the goals, and what happened."""
+    """What a corrector returns."""
 
     poses: Array
     status: str
@@ -122,11 +122,11 @@ class Correction:
     freed: tuple[int, ...]
     """Operations whose motion parameters were free, counted from 0, most recent first."""
     gap_before_m: float
-    """Largest |e| of a vertex at what was seen, [m], or the largest violation of an inequality; so is `gap_after_m`, at
-    the goals."""
+    """Largest |e| of a vertex at the observed poses, [m], or the largest violation of an inequality; so is
+    `gap_after_m`, at the corrected ones."""
     gap_after_m: float
     rank: int
-    """Directions that the equations fix at the goals."""
+    """Directions that the equations fix at the poses."""
     trace: tuple[Iterate, ...] = ()
     tried: tuple[Try, ...] = ()
     """Every set of motion parameters that was tried, in order."""
@@ -135,24 +135,24 @@ class Correction:
     step_poses: Array | None = None
     """(steps, 4, 4) as in `Plan`; None stands for `poses` throughout."""
     test: Consistency | None = None
-    """Whether the stated noise explains the correction; None of correctors that do not ask."""
+    """Whether the stated noise explains the correction; None of correctors without the test."""
     test_after: Consistency | None = None
     """The test without the contacts that were left out; None if none was."""
     covariance: Array | None = None
-    """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown.
+    """(n, 6, 6), of the body twist by which each corrected pose may still be wrong, [m, rad]; None if unknown.
     Contacts that are walls are not counted, so with walls it is an upper bound. Where there are hypotheses, that of the
-    first and of those whose goals are nearly the same; the others lead elsewhere."""
+    first and of those whose poses are nearly the same; the others lead elsewhere."""
     dropped: tuple[str, ...] = ()
     """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was seen is believed, counted from 0: their goals are inferred."""
-    believed: Observation | None = None
+    """Operations of which nothing that was observed is assumed, counted from 0: their poses are inferred."""
+    assumed: Observation | None = None
     """What was corrected in place of the observation, which the posterior is of: without outliers, with further looks;
     None if it was the observation."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
     noise_scale: float = 1.0
-    """How much larger than stated the noise seems to be; `covariance` and `believed` count it."""
+    """How much larger than stated the noise seems to be; `covariance` and `assumed` count it."""
 
     def __post_init__(self) -> None:
         n = len(self.poses)
@@ -167,7 +167,7 @@ class Correction:
         """What the robot is to do after this correction of `observation`.
 
         Raises:
-            InputError: The correction did not converge, so its goals are not meant to be executed.
+            InputError: The correction did not converge, so its poses are not meant to be executed.
         """
         require(
             self.ok,
@@ -199,7 +199,7 @@ class Reobserver(Protocol):
 
 @runtime_checkable
 class ReobservingCorrector(Protocol):
-    """A corrector that can ask; one without this method is never handed a reobserver."""
+    """A corrector that can observe again; one without this method is never handed a reobserver."""
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation that cannot be looked at again."""

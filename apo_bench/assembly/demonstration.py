@@ -14,7 +14,7 @@ from apo_bench.geometry import Array, copyable, freeze
 @copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The truth of a trial: the consistent goals a seed draws, before any human error."""
+    """The truth of a trial: the consistent poses a seed draws, before any human error."""
 
     poses: Array
     start: Poses

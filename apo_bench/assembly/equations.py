@@ -34,7 +34,7 @@ class Equations:
     start: Array
     """(p, 4, 4): the constant motion parameters."""
     letters: NDArray[np.intp]
-    """(c, w): the word D_a^-1 D_b of each contact; p start poses, then n goals, then the identity as padding."""
+    """(c, w): the word D_a^-1 D_b of each contact; p start poses, then n poses, then the identity as padding."""
     inverse: NDArray[np.bool_]
     """(c, w): which letters of the words are inverted."""
     made: NDArray[np.intp]
@@ -73,26 +73,26 @@ class Equations:
             vertex=self.vertex[rows],
         )
 
-    def gaps(self, goals: Array) -> Array:
+    def gaps(self, poses: Array) -> Array:
         """The largest |e| of each contact, (c,), [m]; NaN where a number is not finite."""
         largest_of_each = np.zeros(len(self.letters))
-        np.maximum.at(largest_of_each, self.contact, np.abs(self.residual(goals)))
+        np.maximum.at(largest_of_each, self.contact, np.abs(self.residual(poses)))
         return largest_of_each
 
-    def residual(self, goals: Array) -> Array:
+    def residual(self, poses: Array) -> Array:
         """e of every equation, (m,), [m]: positive where faces are apart, negative where they are inside each other."""
-        return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(goals))[0])
+        return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(poses))[0])
 
-    def linearised(self, goals: Array) -> tuple[Array, Array]:
-        """e, (m,), and its derivative by the body twists of all goals, (m, 6 n), [m] per [m, rad]: df/dq of Eq. 10.
+    def linearised(self, poses: Array) -> tuple[Array, Array]:
+        """e, (m,), and its derivative by the body twists of all poses, (m, 6 n), [m] per [m, rad]: df/dq of Eq. 10.
 
         A letter T in n .. T .. v turns n (everything up to T) = (a, .) and (everything behind T) v = p, so its rows
         are +(a, p x a); T^-1 stays on the side of v, and its rows are -(a, p x a). A T that occurs twice adds up.
         """
         m = len(self)
-        n = len(goals)
+        n = len(poses)
         w = self.letters.shape[1]
-        F = self._matrices(goals)
+        F = self._matrices(poses)
         points = np.array(self._points(F))
         forms = np.array(self._forms(F))
         inverse = self.inverse[self.contact].T
@@ -110,9 +110,9 @@ class Equations:
             J[np.arange(m), columns[:, j]] += rows[j]
         return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
 
-    def _matrices(self, goals: Array) -> Array:
+    def _matrices(self, poses: Array) -> Array:
         """F_1 .. F_w of the word of each equation, (m, w, 4, 4)."""
-        F = np.concatenate([self.start, goals, np.eye(4)[None]])[self.letters]
+        F = np.concatenate([self.start, poses, np.eye(4)[None]])[self.letters]
         return np.where(self.inverse[..., None, None], pose.inverse(F), F)[self.contact]
 
     def _points(self, F: Array) -> list[Array]:
@@ -126,21 +126,21 @@ class Equations:
         return list(accumulate(letters, lambda n, T: np.einsum("mi,mij->mj", n, T), initial=self.plane))
 
 
-def equations(assembly: Assembly, start: Poses, goals: Array) -> Equations:
+def equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
     """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
 
     Contacts of round faces are those of sheets (`project_round_faces`).
 
-    The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `goals`: of
+    The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `poses`: of
     one face only, since both would raise the spurious singular values, and whole, since a lever as long as a table
     turns a degree into centimetres and a clipped polygon changes with the noise.
 
     Args:
-        goals: (n, 4, 4), where the vertices are taken, world frame, [m].
+        poses: (n, 4, 4), where the vertices are taken, world frame, [m].
     """
     known = pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
-    stack = np.concatenate([constants, goals])
+    stack = np.concatenate([constants, poses])
     vertex = np.array(known.corners)
     for c in np.flatnonzero(known.laid):
         rows = slice(known.begin[c], known.begin[c + 1])
@@ -153,9 +153,9 @@ def equations(assembly: Assembly, start: Poses, goals: Array) -> Equations:
     )
 
 
-def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:
-    """The largest |e| of all contacts at `goals`, [m]; 0 if there are none."""
-    return largest(equations(assembly, start, goals).residual(goals))
+def largest_gap(assembly: Assembly, start: Poses, poses: Array) -> float:
+    """The largest |e| of all contacts at `poses`, [m]; 0 if there are none."""
+    return largest(equations(assembly, start, poses).residual(poses))
 
 
 def largest(e: Array) -> float:

@@ -1,71 +1,19 @@
-"""Pairs of faces of which at least one is round: how far off, how far askew, how much of each other they hold.
+"""Pairs of faces of which at least one is round: how far off, how far askew, how much of each other they cover.
 
 What is measured of a pair are as many numbers as its contact has equations (`apo_bench.assembly.projection`), lengths
 first: how far off an axis is, across the other one or in front of a plane, then how far a cone is from its seat; then
-tilts. A turn about the axis changes none of them, so it does not matter how a part of revolution was seen turned.
-
-What kind of contact two faces make, and how much play their sizes leave.
+tilts. A turn about the axis changes none of them, so it does not matter how a part of revolution was observed turned.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import Literal, final, get_args
+from typing import final
 
 import numpy as np
 
+from apo_bench.assembly.contact_kinds import contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, angle_between, mate, pose
-
-ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
-CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
-OPPOSING = -0.9
-"""Cosine between the normals of two faces that look at each other, at most: what contacts leave open tilts faces by a
-few degrees."""
-WALLS = 8
-"""Planes through an axis that stand for the disc of a round fit: sixteen walls, whose corners lie on its circle."""
-_SAME_SLOPE = 2e-3
-"""A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
-
-
-def contact_kind(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
-    """The kind of contact that two faces can make, in either order; None if they can make none."""
-    if isinstance(a, Face) and isinstance(b, Face):
-        return "plane on plane"
-    if isinstance(a, Face) or isinstance(b, Face):
-        wall = b if isinstance(a, Face) else a
-        assert isinstance(wall, RoundFace)
-        return "shaft on plane" if wall.kind == "cylinder" and not wall.hole else None
-    if a.kind == "rim" or b.kind == "rim":
-        rim, cone = (a, b) if a.kind == "rim" else (b, a)
-        return "cone on rim" if cone.kind == "cone" and rim.hole != cone.hole else None
-    if a.hole == b.hole or a.kind != b.kind:
-        return None
-    if a.kind == "cylinder":
-        return "shaft in hole"
-    return "cone in cone" if abs(abs(a.slope) - abs(b.slope)) < _SAME_SLOPE else None
-
-
-def geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
-    """By how much the radius of a hole is larger than that of its shaft, [m]; 0 of every other contact.
-
-    Negative where the shaft is thicker than the hole.
-    """
-    if isinstance(a, Face) or isinstance(b, Face) or contact_kind(a, b) != "shaft in hole":
-        return 0.0
-    return a.radius - b.radius if a.hole else b.radius - a.radius
-
-
-def play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
-    """How far faces that go into one another may be off, [mm]: the clearance if one is fit, and what radii leave.
-
-    None of faces that only touch.
-    """
-    fits = a.fit or b.fit
-    if not fits and contact_kind(a, b) != "shaft in hole":
-        return None
-    return clearance_mm * fits + 1e3 * geometric_play(a, b)
-
 
 _TIGHTEST_M = -0.1e-3
 _LOOSEST_M = 0.6e-3
@@ -101,13 +49,9 @@ class Facing:
     """How many of the residuals are lengths; the others are tilts."""
 
 
-def round_pairs(a: Solid, b: Solid) -> Iterator[tuple[Face | RoundFace, Face | RoundFace]]:
-    """The faces of two solids, at least one of them round, whose kinds and sizes can make a contact."""
-    return iter(_fitting(a, b))
-
-
 @lru_cache(maxsize=1024)
-def _fitting(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
+def round_pairs(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
+    """The faces of two solids, at least one of them round, whose kinds and sizes can make a contact."""
     every: list[list[Face | RoundFace]] = [[*solid.faces.values(), *solid.rounds.values()] for solid in (a, b)]
     return tuple(
         (face, other)

@@ -17,7 +17,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 ArcResiduals = Sequence[float | None]
-"""The largest |e| of every arc, [m]; None where an operation was not seen."""
+"""The largest |e| of every arc, [m]; None where an operation was not observed."""
 
 
 @final
@@ -116,10 +116,10 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     return Graph(len(done), tuple(nodes), arcs)
 
 
-def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
-    """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
+def arc_residuals(assembly: Assembly, start: Poses, poses: Array, graph: Graph) -> tuple[float, ...]:
+    """The largest |e| of every arc, [m], at `poses` (n, 4, 4), world frame, [m] (Section 3.3)."""
     done = project_round_faces(assembly.first(graph.step))
-    reached = goals[: graph.step]
+    reached = poses[: graph.step]
     gaps = equations(done, start, reached).gaps(reached)
     named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]
     mine = [[made == arc.made and contact in arc.contacts for made, contact in named] for arc in graph.arcs]
@@ -127,7 +127,7 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
 
 
 def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
-    """The largest |e| of every arc at the observed goals, [m]; None where an operation that it needs was not seen."""
+    """The largest |e| of every arc at the observed poses, [m]; None if it needs an operation that was not observed."""
     residuals = arc_residuals(observation.assembly, observation.start, observation.poses, graph)
     known = [all(observation.observed[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))

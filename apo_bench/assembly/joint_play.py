@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import contact_kind, play_mm
+from apo_bench.assembly.contact_kinds import contact_kind, play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose
@@ -23,7 +23,7 @@ _LEVER_MM = 30.0
 _DIGITS = 6
 """Of a play in mm; what a program leaves behind them is rounding."""
 _ROUND_M = 9
-"""Digits of a pose [m] that tell two layouts apart."""
+"""Digits of a pose [m] that distinguish two layouts apart."""
 
 AnyFace = Face | RoundFace
 

@@ -22,16 +22,16 @@ from apo_bench.geometry import Array, copyable, freeze
 @copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What was seen: all a corrector may use."""
+    """What was observed: all a corrector may use."""
 
     assembly: Assembly
     start: Poses
     poses: Array
     """(n, 4, 4)."""
     covariance: Array
-    """(n, 6, 6), of the body twist by which each goal is wrong, [m, rad]."""
+    """(n, 6, 6), of the body twist by which each pose is wrong, [m, rad]."""
     observed: NDArray[np.bool_]
-    """(n,): whether the operation was seen at all."""
+    """(n,): whether the operation was observed at all."""
     gap_m: float = 1e-4
     """Largest |e| at which the contact equations count as solved, [m]."""
     play_m: float = 0.0
@@ -62,10 +62,10 @@ class Observation:
         object.__setattr__(self, "observed", observed)
 
     def plan(self) -> Plan:
-        """What was seen, as it is: the plan of the method `uncorrected`.
+        """What was observed, as it is: the plan of the method `uncorrected`.
 
         Raises:
-            InputError: An operation was not seen.
+            InputError: An operation was not observed.
         """
         require(
             self.observed.all(),

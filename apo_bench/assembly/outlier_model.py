@@ -17,9 +17,9 @@ class OutlierModel:
     """Rates and breadths: stated by noise that knows them, assumed otherwise."""
 
     gross: float = 0.1
-    """Part of the operations of which what was seen says nothing."""
+    """Part of the operations of which what was observed says nothing."""
     broad: float = 0.03
-    """Part that is seen with `times` the stated deviation."""
+    """Part that is observed with `times` the stated deviation."""
     times: float = 10.0
     relation: float = 0.001
     """Part of the relations that are wrong."""
@@ -28,7 +28,7 @@ class OutlierModel:
     stale: float = 0.15
     """Part of the gross ones that are where the part was before."""
     swap: float = 0.1
-    """Part of the gross ones that are where another part is, which is seen here in turn."""
+    """Part of the gross ones that are where another part is, which is observed here in turn."""
     shift: float = 0.2
     """Part of the gross ones that are turned rightly and too near or too far; what is left over has no name."""
     view: float = 0.02
@@ -39,34 +39,24 @@ class OutlierModel:
     """Where the camera stands, world frame, [m]: what is too near or far is so on its ray. None: in any direction."""
 
     def __post_init__(self) -> None:
-        named = (self.flip, self.stale, self.swap, self.shift)
-        rates = (self.gross, self.broad, 1.0 - self.gross - self.broad, self.relation, self.view, *named)
-        require(
-            all(0.0 < rate < 1.0 for rate in rates),
-            f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations, "
-            f"{self.flip!r} turned, {self.stale!r} stale, {self.swap!r} exchanged, {self.shift!r} shifted, "
-            f"{self.view!r} displaced together were given; all must be above 0, gross and broad together and each "
-            "other one below 1.",
-        )
-        require(sum(named) < 1.0, f"shares of {sum(named):g} of gross observations have a name; give less than 1.")
-        require(
-            0.0 <= self.repeat < 1.0,
-            f"repeat={self.repeat!r} was given; a later look repeats with 0 to less than 1.",
-        )
-        require(
-            1.0 < self.times < np.inf,
-            f"times={self.times!r} was given; a broad observation needs a finite number above 1.",
-        )
+        named = self.flip + self.stale + self.swap + self.shift
+        for name in ("gross", "broad", "relation", "flip", "stale", "swap", "shift", "view"):
+            rate = getattr(self, name)
+            require(0.0 < rate < 1.0, f"{name}={rate!r} was given; give a rate above 0 and below 1.")
+        require(self.gross + self.broad < 1.0, "gross and broad add up to 1 or more; give rates whose sum is below 1.")
+        require(named < 1.0, f"flip, stale, swap and shift add up to {named:g}; give shares whose sum is below 1.")
+        require(0.0 <= self.repeat < 1.0, f"repeat={self.repeat!r} was given; give a rate of 0 or more and below 1.")
+        require(1.0 < self.times < np.inf, f"times={self.times!r} was given; give a finite number above 1.")
 
     @property
     def surprises(self) -> tuple[float, float, float]:
-        """-2 log of the probability of an inlier, a broad and a gross observation, beside that of an inlier."""
+        """-2 log of the probability of an inlier, a broad and a gross observation, relative to that of an inlier."""
         inlier = 1.0 - self.gross - self.broad
         return 0.0, -2.0 * float(np.log(self.broad / inlier)), -2.0 * float(np.log(self.gross / inlier))
 
     @property
     def relation_surprise(self) -> float:
-        """The same of a wrong relation, beside a right one."""
+        """The same of a wrong relation, relative to a right one."""
         return -2.0 * float(np.log(self.relation / (1.0 - self.relation)))
 
 

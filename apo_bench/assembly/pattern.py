@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.facing_round import OPPOSING, contact_kind
+from apo_bench.assembly.contact_kinds import OPPOSING, contact_kind
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.projection import project_round_faces
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, invert, simplify
@@ -43,7 +43,7 @@ class Pattern:
     corners: Array
     """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
     laid: NDArray[np.bool_]
-    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
+    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the poses."""
     freed: tuple[int, ...]
     """The operations whose motion parameters occur, the most recent first."""
     opposing: Array
@@ -94,20 +94,20 @@ def _opposing(assembly: Assembly, contact: Contact) -> float:
     return 0.0 if tilts else OPPOSING
 
 
-def faces_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
+def faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[np.bool_]:
     """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
     `relations()`; those of round faces as `project_round_faces` has them.
 
     Args:
-        goals: (*, n, 4, 4), world frame, [m].
+        poses: (*, n, 4, 4), world frame, [m].
     """
     known = pattern(assembly)
     constant = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)[:, :3, :3]
-    lead = goals.shape[:-3]
+    lead = poses.shape[:-3]
     R = np.concatenate(
         [
             np.broadcast_to(constant, (*lead, *constant.shape)),
-            goals[..., :3, :3],
+            poses[..., :3, :3],
             np.broadcast_to(np.eye(3), (*lead, 1, 3, 3)),
         ],
         axis=-3,

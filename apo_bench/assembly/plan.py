@@ -21,11 +21,6 @@ class Step(NamedTuple):
     undo: bool = False
 
 
-def once_each(n: int) -> tuple[Step, ...]:
-    """The plain schedule: every operation once, in order."""
-    return tuple(Step(k) for k in range(n))
-
-
 @final
 @check_arguments
 @copyable
@@ -48,7 +43,7 @@ class Plan:
         freeze(self, target_poses=(n, 4, 4), start=(4, 4))
         check_parts(self.assembly, self.start)
         if not self.schedule:
-            object.__setattr__(self, "schedule", once_each(n))
+            object.__setattr__(self, "schedule", tuple(map(Step, range(n))))
         if not len(self.step_poses):
             object.__setattr__(self, "step_poses", self.target_poses[[step.operation for step in self.schedule]])
         freeze(self, step_poses=(len(self.schedule), 4, 4))
@@ -86,14 +81,14 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
 
 
 def poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
-    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
-    goals = np.array(plan.target_poses)
+    """How many operations are done, and the poses in force, before each time something is undone and at the end."""
+    poses = np.array(plan.target_poses)
     done = 0
     stages = []
     for i, (step, target) in enumerate(zip(plan.schedule, plan.step_poses, strict=True)):
         if not step.undo:
-            goals[step.operation] = target
+            poses[step.operation] = target
             done = step.operation + 1
         if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
-            stages.append((done, np.array(goals)))
+            stages.append((done, np.array(poses)))
     return stages

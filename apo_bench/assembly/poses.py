@@ -11,19 +11,19 @@ Poses = Mapping[str, Array]
 """Part name -> pose (4, 4) in the world, [m]."""
 
 
-def placements(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:
+def placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[Poses, ...]:
     """The pose of every part after each operation, what an ODL stands for (Section 3.2.1), by walking the operations.
 
     Args:
         start: Poses before the first operation, world frame, [m].
-        goals: (n, 4, 4), world frame, [m].
+        poses: (n, 4, 4), world frame, [m].
 
     Returns:
         One mapping per operation; a part that was not moved yet stands where it started.
     """
     history: list[Poses] = []
     now = dict(start)
-    for operation, goal in zip(assembly.operations, goals, strict=True):
+    for operation, goal in zip(assembly.operations, poses, strict=True):
         before = now[operation.main]
         now = dict(now)
         # What is carried keeps its place on the main part: T_world_carried = T_goal T_before^-1 T_world_carried.

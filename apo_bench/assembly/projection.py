@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import WALLS, contact_kind
+from apo_bench.assembly.contact_kinds import WALLS, contact_kind
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import require

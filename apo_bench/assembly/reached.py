@@ -83,12 +83,12 @@ class ProbingResult:
     """What a robot has found out about itself by touching, and how sure it is."""
 
     touches: int
-    """How many touches told something."""
+    """How many touches were used."""
     refused: int
     """How many contradict the others and what is stated of the robot."""
     mm: float
     deg: float
-    """How far the base is believed to be off, at the middle of the goals."""
+    """How far the base is assumed to be off, at the middle of the poses."""
     sure_mm: float
     sure_deg: float
     """Standard deviations of that, as root mean squares."""
@@ -110,5 +110,5 @@ class ReplayResult:
     """Each step that was finished, with the simulated time at which it was over, [s]."""
     in_hand: tuple[InHand, ...] = ()
     """Of each operation whose part was grasped; no controller reads it."""
-    felt: ProbingResult | None = None
+    probing: ProbingResult | None = None
     """None of a robot that does not feel."""

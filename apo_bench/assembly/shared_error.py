@@ -44,9 +44,9 @@ class SharedError:
         object.__setattr__(self, "operations", operations)
         freeze(self, covariance=(6, 6), frame=(4, 4), correlation=(m, m))
 
-    def ways(self, goals: Array) -> Array:
-        """A_k of the operations that share it, (m, 6, 6); `goals` are those that were seen, (n, 4, 4)."""
-        seen = goals[list(self.operations)]
+    def ways(self, poses: Array) -> Array:
+        """A_k of the operations that share it, (m, 6, 6); `poses` are those that were observed, (n, 4, 4)."""
+        seen = poses[list(self.operations)]
         if self.frame is None:
             return np.broadcast_to(np.eye(6), (len(seen), 6, 6))
         back = pose.inverse(seen) @ self.frame
@@ -54,26 +54,26 @@ class SharedError:
             back[:, :3, 3] = 0.0
         return pose.adjoint(back)
 
-    def added(self, goals: Array) -> Array:
+    def added(self, poses: Array) -> Array:
         """What it adds to the covariance of the body twists of the operations that share it, (m, 6, 6)."""
-        A = self.ways(goals)
+        A = self.ways(poses)
         C = A @ self.covariance @ np.swapaxes(A, 1, 2)
         return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
 
 
-def joint_covariance(goals: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
+def joint_covariance(poses: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
     """The covariance of the body twists of all operations together, (6 n, 6 n), [m, rad].
 
     Args:
-        goals: (n, 4, 4), those that were seen.
+        poses: (n, 4, 4), those that were observed.
         covariance: (n, 6, 6), of each operation by itself.
     """
-    n = len(goals)
+    n = len(poses)
     joint = np.zeros((n, 6, n, 6))
     six = np.arange(6)
     for error in shared:
         k = np.array(error.operations, dtype=np.intp)
-        A = error.ways(goals)
+        A = error.ways(poses)
         # The twists of operations k and l are A_k c and A_l c, so their covariance is A_k C A_l^t.
         between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
         if error.correlation is not None:

@@ -45,7 +45,7 @@ class Tails:
 
     def draws(self, joint: Array, count: int) -> Array:
         """Body twists of all operations, (count, n, 6), [m, rad]: the same for the same tails, so that what is computed
-        of them is a function of what was seen.
+        of them is a function of what was observed.
 
         Args:
             joint: (6 n, 6 n), the covariance that is stated; what of it is not of these tails is taken for Gaussian.

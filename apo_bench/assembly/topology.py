@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly.facing_round import WALLS, contact_kind, geometric_play
+from apo_bench.assembly.contact_kinds import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
 
@@ -272,6 +272,6 @@ def spell(odl: Iterable[Term]) -> str:
     return " ".join(f"T{k + 1}{'^-1' if inverse else ''}" for k, inverse in odl) or "I"
 
 
-def product(odl: Iterable[Term], goals: Array) -> Array:
-    """The pose an ODL stands for, given the motion parameters `goals` (n, 4, 4) -> (4, 4)."""
-    return reduce(np.matmul, (pose.inverse(goals[k]) if inverse else goals[k] for k, inverse in odl), np.eye(4))
+def product(odl: Iterable[Term], poses: Array) -> Array:
+    """The pose an ODL stands for, given the motion parameters `poses` (n, 4, 4) -> (4, 4)."""
+    return reduce(np.matmul, (pose.inverse(poses[k]) if inverse else poses[k] for k, inverse in odl), np.eye(4))

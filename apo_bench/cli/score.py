@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,14 +17,16 @@ from apo_bench.cli.shared import (
     check_output,
     count_cores,
     path_option,
-    print_columns,
     print_json,
+    print_table,
     say,
 )
 from apo_bench.errors import InputError, require
 
 _OF_ESTIMATORS = "measured"
 """Track of a pose estimator where none is named."""
+_COLUMNS = {"track": "", "score": ".1f", "low": ".1f", "high": ".1f", "trials": "d", "executed": "d", "brier": ".3f"}
+"""Columns of the scores, with their formats."""
 
 
 def score_command(
@@ -37,8 +40,6 @@ def score_command(
         str | None,
         typer.Option(metavar="PROGRAM", help="Program that reads a request, one line of JSON, and answers."),
     ] = None,
-    answers: Annotated[Path | None, path_option("File with one answer for each request of --export.")] = None,
-    export: Annotated[Path | None, path_option("Write all requests: .jsonl; no score.")] = None,
     estimator: Annotated[
         Path | None,
         path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
@@ -59,14 +60,13 @@ def score_command(
       apo-bench score contact --out entries/contact.json
       apo-bench score mine:correct --track given --quick --out entry.json
     """
-    from apo_bench.benchmark.scoring.entrants import entrant, exported
     from apo_bench.benchmark.scoring.entry import check_name, form_of, read_entry, write_entry
+    from apo_bench.benchmark.scoring.program import program_method
     from apo_bench.benchmark.scoring.score import score
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
-    from apo_bench.viz.score_text import entry_lines
+    from apo_bench.viz.form_text import form_table
 
-    given = [option for option in (method, command, answers, export) if option is not None]
-    require(len(given) == 1, f"name one of METHOD, --command, --answers and --export; {len(given)} are given.")
+    require((method is None) != (command is None), "name either METHOD or --command.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
@@ -77,21 +77,16 @@ def score_command(
         "address": address,
         "secret_seed_file": secret_seed_file,
     }
-    if export is not None:
-        check_output(export, "--export", ".jsonl")
-        count = exported(tracks, export, **how)
-        typer.echo(f"{count} requests in {export}; answer each one, and pass the answers by --answers.")
-        return
     if out is None:
         raise InputError("--out is missing; name the file of the entry, such as entry.json.")
     out.parent.mkdir(parents=True, exist_ok=True)
     check_output(out, "--out", ".json")
     if out.exists():
         read_entry(out)  # only an entry may be replaced
-    name = name or command or (None if answers is None else answers.name)
+    name = name or command
     check_name("entry", name or method or "")
     records = out.with_suffix("")
-    with entrant(method, command, answers, records, tracks, **how) as found:
+    with program_method(command, records) if command else nullcontext(str(method)) as found:
         entry = score(
             found,
             tracks,
@@ -104,6 +99,9 @@ def score_command(
     write_entry(entry, out)
     if as_json:
         print_json(form_of(entry))
-    else:
-        print_columns(list(entry_lines(entry)))
-    say(f"Entry: {out}", as_json)
+        return
+    print_table(form_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
+    if entry.overall is not None:
+        few = "; too few trials for a score (--quick)" if entry.quick else ""
+        typer.echo("all {:.1f} ({:.1f} to {:.1f})".format(*entry.overall) + few)
+    typer.echo(f"Entry: {out}")

@@ -10,7 +10,7 @@ What one correction by `contact` calls, in the folder `contact` unless another i
       contact.ContactCorrector.together     many at once; alone what is large, or states tails or shared errors
         contact._corrected
           problem.problem_of                contacts become equations (solvers.laid_contacts), noise becomes L
-          solved.solve                      the nearest goals with rank, covariance and test
+          solved.solve                      the nearest poses with rank, covariance and test
             solvers.gauss_newton._nearest   the loop; each iteration linearises the equations, then takes the shortest z
                                             on them (solvers.linear_step, solvers.sparse, or solvers.kernels compiled)
             chi_square.chi_squares          the squared length of the correction
@@ -18,7 +18,7 @@ What one correction by `contact` calls, in the folder `contact` unless another i
             solved._solved_in_full          instead, where contacts contradict each other, or with inequalities, play or
                                             tails; chi_square.relaxed_chi_square in it runs the loop again
           contact._report                   the Correction, if it is in no doubt; otherwise
-          contact._in_doubt                 not converged, the test fails, a goal turned far, faces look the same way
+          contact._in_doubt                 not converged, the test fails, a pose turned far, faces look the same way
             starts.best_start               other starts, each solved as above; none where only the test has failed
             suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
             contact._report                 the Correction
@@ -27,5 +27,5 @@ What one correction by `contact` calls, in the folder `contact` unless another i
 `solvers` know equations, `checks` what all corrections are asked. `baselines` are what `contact` is compared with
 (`paper` is the method as it was published), `robust` is the corrector that doubts observations, `touches` learns what
 is wrong with the robot from what it touches. The files beside these folders stand above them: who asks for a
-correction, and what is said of one.
+correction, and what is stated of one.
 """

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Reobserver, ReobservingCorrector, project_observation
-from apo_bench.correction.checks.as_given import gap_of, goals_as_given
+from apo_bench.correction.checks.as_given import gap_of, poses_as_given
 from apo_bench.correction.checks.correction_checks import check_correction, check_observation, check_poses
 from apo_bench.correction.checks.status import opposing
 from apo_bench.correction.contact.contact import ContactCorrector
@@ -57,9 +57,9 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
         raise CorrectorMisbehaved(str(own)) from error
     except RAISED as error:
         raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
-    if flat is observation or correction.believed is None:
+    if flat is observation or correction.assumed is None:
         return correction
-    return replace(correction, believed=replace(correction.believed, assembly=observation.assembly))
+    return replace(correction, assumed=replace(correction.assumed, assembly=observation.assembly))
 
 
 def checked_corrector(corrector: Any) -> Any:
@@ -88,7 +88,7 @@ def _admit(returned: Any, observation: Observation, chosen: Any, name: str) -> C
         return returned if isinstance(chosen, ContactCorrector) else opposing(observation, returned)
     if not isinstance(returned, Correction):
         poses = _checked_poses(returned, len(observation.poses), name)
-        return goals_as_given(observation, poses, "the corrector returned poses and no status")
+        return poses_as_given(observation, poses, "the corrector returned poses and no status")
     require(
         returned.status in _STATUSES,
         f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}.",

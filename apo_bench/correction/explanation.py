@@ -4,9 +4,8 @@ Operations are taken in their order. Those before are given, those behind adapt:
 are its block of the null space of the Jacobian without the columns of earlier operations. Counted so, the free
 dimensions of all operations add up to the freedom of the whole, and their ranks to its rank.
 
-How uncertain a direction still is comes from the posterior of all goals at once, so a free direction is as uncertain
-as it was seen, or less where several parts that must move together were seen. A third of this file are the records that
-are returned.
+How uncertain a direction still is comes from the posterior of all poses at once, so a free direction is as uncertain
+as it was observed, or less where several parts that must move together were observed.
 """
 
 from collections.abc import Collection, Iterator
@@ -70,7 +69,7 @@ class OperationExplanation:
     agreeing: tuple[RelationHold, ...]
     """The relations of this operation that are not needed for that."""
     covariance: Array
-    """(6, 6), posterior, of the body twist at its goal, [m, rad]."""
+    """(6, 6), posterior, of the body twist at its pose, [m, rad]."""
 
 
 @final
@@ -103,7 +102,7 @@ class Explanation:
     """What the contacts determine of a whole demonstration."""
 
     assembly: Assembly
-    goals: Array
+    poses: Array
     """(n, 4, 4), at which it was problem."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
@@ -116,18 +115,18 @@ class Explanation:
     shared: tuple[SharedEstimate, ...] = ()
     """What is known of the errors that operations share."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was seen is believed, counted from 0."""
+    """Operations of which nothing that was observed is assumed, counted from 0."""
     hypotheses: tuple[Hypothesis, ...] = ()
-    """What else may be believed of what was seen, each with its weight, as of the correction."""
+    """What else may be assumed of what was observed, each with its weight, as of the correction."""
 
 
 @check_arguments
-def explain(observation: Observation, goals: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
-    """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
+def explain(observation: Observation, poses: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
+    """What the contacts determine at poses that satisfy them, and how uncertain these are after what was observed.
 
     Args:
-        goals: (n, 4, 4), consistent with every contact, world frame, [m]; or a correction, which says in addition what
-            of the observation is believed and which relations are not.
+        poses: (n, 4, 4), consistent with every contact, world frame, [m]; or a correction, which says in addition what
+            of the observation is assumed and which relations are not.
         dropped: Relations, R1, R2, .., that are left out; so are inequalities, which leave a part free between them.
 
     Raises:
@@ -136,25 +135,25 @@ def explain(observation: Observation, goals: Array | Correction, dropped: Collec
     given = observation.assembly
     left_out = tuple[int, ...]()
     hypotheses = tuple[Hypothesis, ...]()
-    if isinstance(goals, Correction):
-        left_out = goals.left_out
-        hypotheses = goals.hypotheses
-        dropped = (*goals.dropped, *dropped)
-        observation = goals.believed or observation
-        goals = goals.poses
+    if isinstance(poses, Correction):
+        left_out = poses.left_out
+        hypotheses = poses.hypotheses
+        dropped = (*poses.dropped, *dropped)
+        observation = poses.assumed or observation
+        poses = poses.poses
     observation = project_observation(observation)
-    n = len(goals)
+    n = len(poses)
     assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    problem = problem_of((replace(observation, poses=goals, shared=()),))
+    problem = problem_of((replace(observation, poses=poses, shared=()),))
     system = problem.laid.system.only(0)
     kept = problem.demands.exact & problem.without(tuple(dropped))
-    # B = J_r(xi) L makes body twists at the goals of z, so J B is the derivative by z.
-    xi = pose.log(pose.inverse(observation.poses) @ goals)
+    # B = J_r(xi) L makes body twists at the poses of z, so J B is the derivative by z.
+    xi = pose.log(pose.inverse(observation.poses) @ poses)
     Jr = right_jacobian(xi)
     B = Jr @ problem.L[0]
-    _, Jt = linearised_by(system, goals, B)
+    _, Jt = linearised_by(system, poses, B)
     every = relation_holds(assembly)
     relations = by_relation(assembly, system, Jt, kept)
     known = freedom_of(relations.Jt)
@@ -184,9 +183,9 @@ def explain(observation: Observation, goals: Array | Correction, dropped: Collec
         )
     return Explanation(
         assembly=given,
-        goals=goals,
+        poses=poses,
         operations=tuple(explained),
-        parts=_standing(assembly, observation.start, goals, B, spans),
+        parts=_standing(assembly, observation.start, poses, B, spans),
         rank=known.rank,
         freedom=known.free.shape[1],
         redundant=known.redundant - _void(assembly, kept),
@@ -239,20 +238,20 @@ def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...
     return tuple(int(j) for j in np.flatnonzero(moved > 1e-6 * moved[k]) if j > k)
 
 
-def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: Array) -> tuple[PartExplanation, ...]:
-    """Every part that was moved, at the end; its pose is a product of goals, so errors go through all of them."""
+def _standing(assembly: Assembly, start: Poses, poses: Array, B: Array, spans: Array) -> tuple[PartExplanation, ...]:
+    """Every part that was moved, at the end; its pose is a product of poses, so errors go through all of them."""
     if not len(assembly):
         return ()
-    final = placements(assembly, start, goals)[-1]
+    final = placements(assembly, start, poses)[-1]
     last = assembly.odls()[-1]
     # The ODLs at the end, in which one operation per part that puts it at its start comes first.
     words = dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])
-    stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
+    stack = np.concatenate([np.array([start[part] for part in assembly.solids]), poses])
     explained = []
     for part in last:
-        # The part's twist is a sum over goals, so spans of all goals go through it together. `unit` is how far each
-        # component was seen to deviate: directions are told from rounding in that unit.
-        reach = _reach(words[part], stack, len(assembly.solids), len(goals))
+        # The part's twist is a sum over poses, so spans of all poses go through it together. `unit` is how far each
+        # component was observed to deviate: directions are distinguished from rounding in that unit.
+        reach = _reach(words[part], stack, len(assembly.solids), len(poses))
         moved = reach.reshape(6, -1) @ spans.reshape(reach[0].size, -1)
         unit = np.sqrt(np.square(np.swapaxes(reach, 0, 1) @ B).sum(axis=(0, 2)))[:, None]
         U, w, _ = np.linalg.svd(moved / unit, full_matrices=False)
@@ -265,7 +264,7 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
 
 
 def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:
-    """What the body twist of each goal makes of that of a product of poses, (6, n, 6).
+    """What the body twist of each pose makes of that of a product of poses, (6, n, 6).
 
     T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
     """

@@ -23,12 +23,12 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
     if correction.covariance is None or not correction.ok:
         return None
     if not correction.hypotheses:
-        return _contains(correction.believed or observation, correction.poses, correction.dropped, truth, level)
+        return _contains(correction.assumed or observation, correction.poses, correction.dropped, truth, level)
     each = np.sqrt(level)
     known = list[bool]()
     weight = 0.0
     for one in correction.hypotheses:
-        inside = _contains(one.believed, one.poses, one.dropped, truth, each)
+        inside = _contains(one.assumed, one.poses, one.dropped, truth, each)
         known += [] if inside is None else [inside]
         weight += one.weight
         if weight >= each:
@@ -36,19 +36,19 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
     return any(known) if known else None
 
 
-def _contains(believed: Observation, goals: Array, dropped: tuple[str, ...], truth: Array, level: float) -> bool | None:
-    """The same of the goals that what is believed leads to.
+def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], truth: Array, level: float) -> bool | None:
+    """The same of the poses that what is assumed leads to.
 
-    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
+    The region is taken in the tangent space of the contact manifold at the corrected poses: the squared length of the
     deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
     """
     from scipy.special import chdtri
 
-    observation = project_observation(believed)
+    observation = project_observation(assumed)
     L = noise_factor(observation)
-    xi = pose.log(pose.inverse(observation.poses) @ goals)
+    xi = pose.log(pose.inverse(observation.poses) @ poses)
     system = seen_system(observation).among(_equal(observation, dropped))
-    known = freedom_of(linearised_by(system, goals, right_jacobian(xi) @ L)[1])
+    known = freedom_of(linearised_by(system, poses, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free

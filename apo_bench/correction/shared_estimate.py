@@ -24,7 +24,7 @@ class SharedEstimate:
 
     error: SharedError
     twist: Array
-    """(6,), [m, rad], in its frame: how far what was seen is off, the opposite of what takes it to the truth."""
+    """(6,), [m, rad], in its frame: how far what was observed is off, the opposite of what takes it to the truth."""
     covariance: Array
     """(6, 6), posterior, of that."""
 
@@ -37,19 +37,19 @@ class SharedEstimate:
 def estimate_shared(
     observation: Observation, xi: Array, Jr: Array, system: CompactEquations
 ) -> tuple[tuple[SharedEstimate, ...], Array]:
-    """The errors that are one and the same in several operations, and how uncertain all goals are together.
+    """The errors that are one and the same in several operations, and how uncertain all poses are together.
 
     Shared error c and body twists xi are jointly Gaussian, cov(c, xi_k) = C A_k^t: given the corrected twists, c has
     the mean K xi and the covariance C - K A C, K = C A^t S^-1, to which comes what is uncertain of the twists.
 
     Args:
-        xi: (n, 6), the body twists from what was seen to the corrected goals, [m, rad].
+        xi: (n, 6), the body twists from what was observed to the corrected poses, [m, rad].
         Jr: (n, 6, 6), their right Jacobians.
         system: The equations that hold.
 
     Returns:
         One estimate for each shared error that is no mere correlation, and (n, 6, f) of which the products with
-        themselves are the posterior covariances of the body twists at the corrected goals.
+        themselves are the posterior covariances of the body twists at the corrected poses.
 
     Raises:
         InputError: Too many operations.

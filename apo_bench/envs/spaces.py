@@ -131,6 +131,6 @@ def insert_observation(
     seen: dict[str, Any] = {
         "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],
         "wrench": feel.wrench,
-        "plan": np.concatenate([control.start.way, way, control.sigmas(covariance) * MM_DEG, action]),
+        "plan": np.concatenate([control.start.direction, way, control.sigmas(covariance) * MM_DEG, action]),
     }
     return {name: np.clip(seen[name], -most, most).astype(np.float32) for name, most in _SEEN.items()}

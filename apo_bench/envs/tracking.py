@@ -43,7 +43,7 @@ def paper_track_policy(known: Tracked) -> tuple[Act, ...]:
     if not seen.observed.all():
         return ()
     step = next_operation(seen, known.placed, nested)
-    return _acts(known, step.goals, step.freed) if step.status == "converged" else ()
+    return _acts(known, step.poses, step.freed) if step.status == "converged" else ()
 
 
 def contact_policy(known: Tracked) -> tuple[Act, ...]:

@@ -1,4 +1,4 @@
-"""What never changes: read-only arrays, records that stay so in every copy, and answers that follow from them."""
+"""Read-only arrays, records that stay so in every copy, and a cache of what follows from them."""
 
 import copyreg
 from collections.abc import Callable, Mapping
@@ -105,7 +105,7 @@ def _reduced(record: Any) -> tuple[Any, ...]:
 def remembered(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """Keep what a function of an object, and of plain values, returned, for as long as the object lives.
 
-    For objects that are compared by identity and never change. What is returned is shared, so nobody may change it.
+    For objects that are compared by identity and never change. What is returned is shared, so it must not be changed.
     """
     known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Answer]] = WeakKeyDictionary()
 

@@ -26,9 +26,8 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     of it, are left out.
 
     Every side of a piece that carries a fit face, or a piece of one, moves into it by the clearance; so a round hole
-    gets wider. The nominal
-    part has none: walls and stick of one size touch. With clearance c a stick of 20 mm is 20 - 2c thick, a pocket of
-    50 mm is 50 + 2c wide.
+    gets wider. The nominal part has none: walls and stick of one size touch. With clearance c a stick of 20 mm is
+    20 - 2c thick, a pocket of 50 mm is 50 + 2c wide.
 
     Args:
         clearance_m: How far each fit face recedes, >= 0, [m].
@@ -47,7 +46,7 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
 
 @remembered
 def receded_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """`physical_pieces` of a part that fits; beside pieces other than boxes, a box is taken as one of them.
+    """`physical_pieces` of a part that fits; among pieces other than boxes, a box is taken as one of them.
 
     By less than nothing they come forward.
     """

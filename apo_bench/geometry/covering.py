@@ -12,7 +12,7 @@ from apo_bench.geometry.polygon import polygons_of, rings_of, straighten
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
-"""Cosine between the normals below which a face is seen edge-on and covers nothing."""
+"""Cosine between the normals below which a face is observed edge-on and covers nothing."""
 SLIVER_M2 = 1e-12
 """Pieces smaller than this, (0.001 mm)^2, are rounding, not overlap."""
 
@@ -57,7 +57,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
         T_on: World pose of that solid, (4, 4), [m].
 
     Returns:
-        The overlap; nothing, if the faces only touch along an edge or `face` is seen edge-on.
+        The overlap; nothing, if the faces only touch along an edge or `face` is observed edge-on.
     """
     common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
@@ -73,7 +73,7 @@ def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
 
 
 def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
-    """How far `face`, projected onto the plane of `on`, lies beside it, [m]; 0 if one covers some of the other."""
+    """How far `face`, projected onto the plane of `on`, lies off it, [m]; 0 if one covers some of the other."""
     return float(face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face).distance(own_shape(on)))
 
 

@@ -1,8 +1,8 @@
 """The turns that carry a solid of any pieces and faces onto itself: found by where its faces can go.
 
-The middles of faces, and their corners, are points that a symmetry carries onto points of faces that are alike. Two of
+The middles of faces, and their corners, are points that a symmetry carries onto points of like faces. Two of
 them that do not lie on one line with the centre of volume say all of a turn, so every pair of points that they could
-be carried to gives one candidate; those that carry all faces onto faces alike, and pieces into pieces, are kept.
+be carried to gives one candidate; those that carry all faces onto like faces, and pieces into pieces, are kept.
 """
 
 from typing import NamedTuple
@@ -45,7 +45,7 @@ def exact_turns(solid: Solid) -> Array:
 
 
 def carries_faces(solid: Solid, g: Array) -> bool:
-    """Whether a displacement, (4, 4), carries faces onto faces that are alike, and pieces into pieces."""
+    """Whether a displacement, (4, 4), carries faces onto like faces, and pieces into pieces."""
     about = centred_turn(solid, g[:3, :3])
     return bool(
         np.abs(g - about).max() < _SAME_M
@@ -154,7 +154,7 @@ def _on_walls(rounds: list[RoundFace], corners: Array) -> NDArray[np.bool_]:
 
 
 def _candidates(marks: _Marks) -> list[Array]:
-    """Turns, (3, 3), that carry two of the rarest marks onto marks alike."""
+    """Turns, (3, 3), that carry two of the rarest marks onto like marks."""
     far = np.linalg.norm(marks.points, axis=1)
     rare = np.bincount(marks.tags)[marks.tags]
     order = [int(i) for i in np.lexsort((np.arange(len(far)), rare)) if far[i] > 1e3 * _SAME_M]
@@ -193,7 +193,7 @@ def _frame(p: Array, q: Array) -> Array:
 
 
 def _carries(marks: _Marks, R: Array) -> bool:
-    """Whether a turn carries every mark onto one that is alike."""
+    """Whether a turn carries every mark onto one with the same tag."""
     apart = np.linalg.norm((marks.points @ R.T)[:, None] - marks.points[None], axis=-1)
     near = (apart < 10 * _SAME_M) & (marks.tags[:, None] == marks.tags[None])
     return bool(near.any(axis=1).all() and near.any(axis=0).all())

@@ -32,7 +32,7 @@ class Flips(NamedTuple):
     shares: Array
     """(m,), the part of its volume that the turned part covers."""
     exact: NDArray[np.bool_]
-    """(m,), whether the turn is one of `symmetries`: nothing can be seen then, but contacts name other faces."""
+    """(m,), whether the turn is one of `symmetries`: nothing can be observed then, but contacts name other faces."""
 
 
 @remembered

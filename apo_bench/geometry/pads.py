@@ -23,7 +23,7 @@ FINGER_ROOM_M = 0.012
 """How thick a finger is; how far it stands off before it closes."""
 _PALM_M = 0.060
 _OVER_M = 0.0115
-"""A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
+"""A part reaches at most so far up next to the tips, which are at least so high above what it stands on."""
 _RAY_M = 0.003
 _FINE_M = 0.001
 _FLAT_M = 1e-4
@@ -98,7 +98,7 @@ def held_width(
 
 
 def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
-    """Whether pads hold all the width of a part, not an arm of it, nor the air beside it."""
+    """Whether pads hold all the width of a part, not an arm of it, nor the air next to it."""
     low, high = extent(pieces, across)
     own = held_width(pieces, tuple(point), tuple(across), tuple(up))
     return own is not None and own > (high - low) / 2 - _LESS_M

@@ -24,7 +24,7 @@ from apo_bench.geometry.solid import Piece, Solid, all_boxes
 _TOUCHING_M = 1e-6
 """Balls around solids are apart if this far from each other, whatever was rounded."""
 TOUCH_M = 1e-6
-"""Deeper than this a solid is in another one, and no longer beside it."""
+"""Deeper than this a solid is in another one, and no longer next to it."""
 _STEP_M = 5e-4
 """Places along a fall are so far apart: two boxes that together are thinner could pass each other unseen."""
 _MOST_PLACES = 10_000

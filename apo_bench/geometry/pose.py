@@ -95,7 +95,7 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
 def turn_deg(T: ArrayLike) -> Array:
     """The turns about the fixed x, then y, then z axis of a pose (4, 4), (3,), [degrees]; inverse of `at`.
 
-    Quarter turns are exact up to rounding. With y at 90 degrees x and z turn about one axis: z is said to be 0.
+    Quarter turns are exact up to rounding. With y at 90 degrees x and z turn about one axis: z is 0.
     """
     # Of R = Rz Ry Rx the first column is (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y,
     # cos x cos y).

@@ -28,7 +28,7 @@ class Face:
     stated_normal: Array | None = None
     """Of a sheet, whose corners need not make a polygon: points, or the ends of a line."""
     opposes: bool = True
-    """Whether what touches it looks the other way; a plane through an axis has two sides that are alike."""
+    """Whether what touches it looks the other way; a plane through an axis has two equal sides."""
 
     def __post_init__(self) -> None:
         freeze(self, outline=(None, 3))

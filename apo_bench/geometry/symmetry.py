@@ -82,7 +82,7 @@ def turn_alike(solid: Solid, T: Array, true: Array) -> Array:
     if about is None:
         return T
     # What is left between the two, M, is to turn the least: of both ways round, the turn about the axis with the
-    # greatest trace. The centre of volume stays where it is seen.
+    # greatest trace. The centre of volume stays where it is observed.
     M = true[:3, :3].T @ T[:3, :3]
     a = about.axis
     across = across_axis(a)
@@ -129,7 +129,7 @@ def symmetries(solid: Solid) -> Array:
     Fit faces lie on fit faces then, too: a part that recedes on one side only does not look the same from both.
     A union of axis-aligned boxes has faces towards both ends of all three axes and no others, so a turn that leaves it
     as it is carries axes onto axes: the 24 quarter turns about the centre of volume are all that can. Names of faces
-    do not count. Seen at `T g` it looks as it does at `T`.
+    do not count. Observed at `T g` it looks as it does at `T`.
 
     A solid of other pieces or with round faces is turned by where its faces can go (`exact_turns`). Of a part of
     revolution, which has any number of them, those are here that turn its axis: none but the identity, or one more.

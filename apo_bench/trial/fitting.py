@@ -87,7 +87,7 @@ def fitting_plan(correction: Correction, observation: Observation, where: Scene 
             return FittingPlan(plan)
         where = build_scene(where)
     why = _fault(where, plan)
-    goals = _goals_that_fit(plan, correction.believed or observation, where) if why else None
+    goals = _goals_that_fit(plan, correction.assumed or observation, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
     return FittingPlan(plan.with_target_poses(goals), _moves(plan.target_poses, goals), why)

@@ -23,7 +23,7 @@ from apo_bench.correction.solvers import (
     compact_equations,
     demanded,
     freedom_of,
-    nearest_goals,
+    nearest_poses,
     noise_factor,
     twists_of,
     violations,
@@ -64,9 +64,9 @@ class _Held(NamedTuple):
 
     def put_back(self, goals: Array) -> Array | None:
         """The nearest goals at which every contact holds as well as before; None if none were found."""
-        nearest = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
-        off = violations(self.system, self.exact, self.inequalities, nearest.goals)
-        return nearest.goals if nearest.finite and (off <= self.limits)[self.kept].all() else None
+        nearest = nearest_poses(self.compact.among(self.kept & self.exact), goals, self.L)
+        off = violations(self.system, self.exact, self.inequalities, nearest.poses)
+        return nearest.poses if nearest.finite and (off <= self.limits)[self.kept].all() else None
 
 
 @final
@@ -102,7 +102,7 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
         InputError: A covariance is not positive definite.
     """
     held = _held(observation, goals)
-    nearest = nearest_goals(held.compact.among(held.kept & held.exact), goals, held.L)
+    nearest = nearest_poses(held.compact.among(held.kept & held.exact), goals, held.L)
     # B Z: twists of one standard deviation along the null space Z of the whitened equations
     known = freedom_of(nearest.Jt)
     if known is None or not known.free.shape[1]:

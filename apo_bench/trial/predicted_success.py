@@ -79,10 +79,10 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     if correction is None:
         return (Explanation(1.0, believed, goals),)
     if not correction.hypotheses:
-        return (Explanation(1.0, correction.believed or believed, correction.poses, correction.dropped, blind),)
+        return (Explanation(1.0, correction.assumed or believed, correction.poses, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
     share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
-    return tuple(Explanation(share * each.weight, each.believed, each.poses, each.dropped, blind) for each in likely)
+    return tuple(Explanation(share * each.weight, each.assumed, each.poses, each.dropped, blind) for each in likely)
 
 
 def predict_success(

@@ -83,7 +83,7 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
 def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
     return {
         "from": tip_form(place.T_world_tip, frames),
-        "direction": _turned(place.way, frames),
+        "direction": _turned(place.direction, frames),
         "point_in_tip_mm": _mms(place.patch.mean(axis=0)),
         "corners_in_tip_mm": [_mms(corner) for corner in place.patch],
         **_plane(place.normal, place.offset, frames),
@@ -132,7 +132,7 @@ def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | N
         "then_walls": [
             {
                 "from": tip_form(place.T @ grip.T_part_tip, frames),
-                "direction": _turned(place.way, frames),
+                "direction": _turned(place.direction, frames),
                 "point_in_part_mm": _mms(place.point),
                 **_plane(place.normal, float(place.normal @ place.edge), frames),
             }

@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import correct, correct_many
 from apo_bench.assembly import faces_away, placements
-from apo_bench.assembly.facing_round import OPPOSING
+from apo_bench.assembly.contact_kinds import OPPOSING
 from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look, shown

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import pytest
 
@@ -41,21 +40,6 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
     assert half == "Nehalem is not run: OpenBLAS takes Nehalem and SkylakeX for it on this processor"
     assert dead == "Cooperlake is not run: this processor lacks instructions that it needs"
     assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4", "NUMBA_CPU_NAME": "generic"}
-
-
-@pytest.mark.parametrize(
-    ("program", "words"),
-    [
-        ("import os, signal; os.kill(os.getpid(), signal.SIGILL)", "this processor lacks instructions that it needs"),
-        ("raise SystemExit(3)", "a process under it ended with 3"),
-    ],
-)
-def test_a_kernel_whose_instructions_are_missing_is_named_as_such(
-    program: str, words: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "program.py").write_text(program)
-    monkeypatch.setattr(switches, "__file__", str(tmp_path / "program.py"))
-    assert switches.under({}) == words
 
 
 @pytest.mark.parametrize(
@@ -107,13 +91,3 @@ def test_every_kernel_has_its_command_and_one_that_fails_is_not_lost(
         assert "-- four is not run\n" in said
         for name in names:
             assert f"-- under {name}\n{name} of {json.dumps(asdict(OWN))}\naside\n" in said
-
-
-@pytest.mark.parametrize(("names", "processes"), [(("one",), "2"), (("one", "two"), "0")])
-def test_a_single_kernel_has_both_cores(
-    names: tuple[str, ...], processes: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(switches, "under", lambda asked: OWN)
-    monkeypatch.setattr(switches, "switches", lambda own: iter([Switch(name, {}, own) for name in names]))
-    assert switches.main(["echo", "-n", "processes", switches.PROCESSES]) == 0
-    assert capsys.readouterr().out.count(f"processes {processes}") == len(names)

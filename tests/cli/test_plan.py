@@ -250,7 +250,7 @@ def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
         assert [motion.name for motion in t.macros] == [macro.name for macro in what.after.macros]
         assert len(t.departs) == len(what.before.departs)
         for motion, macro in zip(t.macros, what.after.macros, strict=True):
-            np.testing.assert_allclose(motion.way, T[:3, :3] @ what.after.own(macro.direction), atol=1e-9)
+            np.testing.assert_allclose(motion.direction, T[:3, :3] @ what.after.own(macro.direction), atol=1e-9)
 
 
 def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(

@@ -43,7 +43,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
     if not free:
         return float(np.abs(system.residual(goals)).max())
     moved = solve_newton(system, goals, free, cut_off=1e-6)
-    return float(np.abs(system.residual(moved.goals)).max())
+    return float(np.abs(system.residual(moved.poses)).max())
 
 
 @pytest.mark.parametrize("name", ["pocket_table", "dovetail", "gearbox"])

@@ -127,7 +127,7 @@ def test_a_missing_view_is_inferred_from_a_round_contact():
         made = correct(replace(observation, observed=np.array([True, False])), "contact-robust")
         assert made.ok, made.sentence
         assert made.left_out == (1,)
-        assert made.believed.assembly is observation.assembly
+        assert made.assumed.assembly is observation.assembly
         error = pose.log(pose.inverse(truth[1]) @ made.poses[1])
         if kind == "cone in cone":
             assert np.abs(np.delete(error, free)).max() < 0.01

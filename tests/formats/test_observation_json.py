@@ -68,7 +68,7 @@ def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None
     assert read(tmp_path, form()).outliers is None
     some = read(tmp_path, form() | {"outliers": {"gross_rate": 0.3}})
     assert some.outliers == OutlierModel(0.3)
-    with pytest.raises(InputError, match=r"seen\.json, outliers: rates of 1\.5 gross"):
+    with pytest.raises(InputError, match=r"seen\.json, outliers: gross=1\.5 was given"):
         read(tmp_path, form() | {"outliers": {"gross_rate": 1.5}})
     with pytest.raises(InputError, match=r"unknown key 'gros_rate' .did you mean 'gross_rate'"):
         read(tmp_path, form() | {"outliers": {"gros_rate": 0.1}})

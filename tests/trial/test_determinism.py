@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from apo_bench import Scene, SweepConfig, TrialConfig, build_scene, load_scenario, run_sweep, run_trial
-from apo_bench.cli.app import main
 from apo_bench.records.run.run_folder import read_records
 from apo_bench.trial.stages import simulate_demonstration
 
@@ -68,45 +62,3 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
         build_scene(load_scenario("stick_on_castles")),
     )
     assert alone in rows
-
-
-@pytest.mark.slow
-def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    command = [
-        *(
-            "sweep",
-            "stick_on_castles",
-            "--noise-level",
-            "0,1",
-            "--human-error-scale",
-            "1",
-            "--method",
-            "uncorrected,paper",
-        ),
-        *("--trials", "4", "--grasp", "weld", "--workers", "2", "--out", str(out)),
-    ]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "apo_bench.cli.app", *command],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
-    )
-    deadline = time.monotonic() + 120
-    while not (out / "trials.jsonl").exists() or not (out / "trials.jsonl").read_bytes():
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
-    _, complaint = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert complaint.startswith("apo-bench: interrupted")
-    assert "Traceback" not in complaint
-    left = read_records(out)
-    assert 0 < len(left) < 16
-    assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
-    assert main(command) == 0
-    rows = read_records(out)
-    assert rows[: len(left)] == left
-    assert len({json.dumps(row) for row in rows}) == 16

@@ -69,7 +69,7 @@ def test_touches_are_where_the_simulated_hand_touches(name: str, frames: str) ->
             assert np.allclose(v, place.patch.mean(axis=0), atol=1e-9)
             assert np.allclose(n, place.normal, atol=1e-9)
             assert d == pytest.approx(place.offset, abs=1e-9)
-            assert np.allclose(FRAMES[frames].T_world_base[:3, :3] @ one["direction"], place.way, atol=1e-9)
+            assert np.allclose(FRAMES[frames].T_world_base[:3, :3] @ one["direction"], place.direction, atol=1e-9)
             assert n @ pose.apply(T, v[None])[0] - d == pytest.approx(STAND_OFF_M, abs=1e-9)
     assert said["at_most_mm"] > said["expected_after_mm"] == 1e3 * STAND_OFF_M
 

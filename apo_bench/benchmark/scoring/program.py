@@ -1,4 +1,4 @@
-"""A program in any language as a corrector: for each trial it is started, reads one line of JSON and writes one.
+"""A program in any language as a corrector: each trial starts it, it reads one line of JSON and writes one.
 
 A request, `apo-bench/request/1`, is all that a corrector may use: an observation as files have it, with `carries` and
 `contacts` (pairs of `part.face`) in each operation, `faces` (`part.face` -> a point and a direction in the frame of the
@@ -9,11 +9,13 @@ part, radii where it is round), `fixed` parts, and an `id`. The answer is `{"pos
 import hashlib
 import json
 import os
-import signal
+import shlex
+import shutil
 import subprocess
 import tempfile
-from contextlib import suppress
-from threading import Timer
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,21 +25,55 @@ from apo_bench.errors import InputError, require
 from apo_bench.formats.json_forms import PoseForm
 from apo_bench.formats.observation_json import observation_form
 from apo_bench.geometry import Array, Face, RoundFace
-from apo_bench.io import Table, convert_typed, decoded, parse_plain
+from apo_bench.io import Table, convert_typed, decoded, parse_plain, write_file
+from apo_bench.names import own_modules_in
 
 REQUEST = "apo-bench/request/1"
 LARGEST_ANSWER_BYTES = 16_000_000
-"""A program that writes more is ended."""
 ANSWER_LIMIT_S = 120.0
 """A program that takes longer is ended."""
 _ENVIRONMENT = ("PATH", "LANG")
-"""All that a program finds in its environment; `env NAME=value program` as command gives it more."""
+"""The environment of a program; `env NAME=value program` as command gives it more."""
 _HEX = 32
 _MM = 1e3
+_MODULE = """
+'''Made by `apo-bench score`.'''
+
+from functools import partial
+
+from apo_bench.benchmark.scoring.program import ask_program
+
+corrector = partial(ask_program, {words}, {folder!r})
+"""
+
+
+@contextmanager
+def program_method(command: str, folder: Path) -> Iterator[str]:
+    """Name a program as a method, `module:name`, for a while; a small module in a folder runs it.
+
+    Args:
+        command: A program with its arguments, as in a shell but started without one, in the current folder.
+        folder: Where the module is written.
+
+    Raises:
+        InputError: No such program.
+    """
+    try:
+        words = tuple(shlex.split(command))
+    except ValueError as error:
+        raise InputError(f"the command {command!r} was given, which is no command line ({error}).") from error
+    require(words, "an empty command was given; name a program.")
+    require(shutil.which(words[0]), f"the program '{words[0]}' was given, which is not found; give its path.")
+    text = _MODULE.format(words=words, folder=str(Path.cwd()))
+    name = f"entrant_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    write_file(folder / f"{name}.py", text)
+    with own_modules_in(str(folder.resolve())):
+        yield f"{name}:corrector"
 
 
 def ask_program(command: tuple[str, ...], folder: str, observation: Observation) -> Array:
-    """The goals that a program makes of an observation, (n, 4, 4), [m].
+    """The poses that a program makes of an observation, (n, 4, 4), world frame, [m].
 
     Args:
         command: The program and its arguments.
@@ -47,39 +83,43 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
         InputError: It cannot be started, fails, takes too long, or answers something else.
     """
     program = f"the program '{command[0]}'"
-    process = _start(command, folder, f"{request_line(observation)}\n".encode())
-    limit = Timer(ANSWER_LIMIT_S, _end, [process])
-    limit.start()
-    with process:
-        answer = process.stdout.read(LARGEST_ANSWER_BYTES + 1) if process.stdout else b""
-        if len(answer) > LARGEST_ANSWER_BYTES:
-            _end(process)
-    is_late = not limit.is_alive()
-    limit.cancel()
+    environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
+    # files, not pipes: the program may write before it reads, and as much as it likes
+    with tempfile.TemporaryFile() as request, tempfile.TemporaryFile() as written:
+        request.write(f"{request_line(observation)}\n".encode())
+        request.seek(0)
+        streams: dict[str, Any] = {"stdin": request, "stdout": written, "cwd": folder, "env": environment}
+        try:
+            ended = subprocess.run(command, **streams, timeout=ANSWER_LIMIT_S, check=False)
+        except subprocess.TimeoutExpired as error:
+            raise InputError(f"{program} took longer than {ANSWER_LIMIT_S:g} s and was ended.") from error
+        except OSError as error:
+            raise InputError(f"{program} cannot be run ({error}).") from error
+        written.seek(0)
+        answer = written.read(LARGEST_ANSWER_BYTES + 1)
     require(
         len(answer) <= LARGEST_ANSWER_BYTES,
-        f"{program} wrote more than {LARGEST_ANSWER_BYTES / 1e6:g} MB and was ended; one line of JSON is needed.",
+        f"{program} wrote more than {LARGEST_ANSWER_BYTES / 1e6:g} MB; one line of JSON is needed.",
     )
-    require(not is_late, f"{program} took longer than {ANSWER_LIMIT_S:g} s and was ended.")
-    require(process.returncode == 0, f"{program} ended with exit code {process.returncode}.")
+    require(ended.returncode == 0, f"{program} ended with exit code {ended.returncode}.")
     require(answer.strip(), f"{program} wrote no answer; one line of JSON is needed.")
     where = f"the answer of {program.removeprefix('the program ')}"
-    _, poses = parse_answer(decoded(answer, where, "JSON"), where)
+    form = convert_typed(parse_plain(decoded(answer, where, "JSON"), where, "json"), _Answer, where)
     count = len(observation.poses)
-    require(len(poses) == count, f"{where}, poses: {count} entries are needed, {len(poses)} were given.")
-    return poses
+    require(len(form.poses) == count, f"{where}, poses: {count} entries are needed, {len(form.poses)} were given.")
+    poses = [each.matrix(f"{where}, pose {i}") for i, each in enumerate(form.poses, start=1)]
+    return np.array(poses).reshape(-1, 4, 4)
 
 
 def request_line(observation: Observation) -> str:
-    """A request on one line; its `id` is a hash of all else, so that an answer finds its question."""
-    form = request_form(observation)
+    """A request on one line; its `id` is a hash of all else."""
+    form = _request_form(observation)
     text = json.dumps(form, sort_keys=True, allow_nan=False)
     return json.dumps({"id": hashlib.sha256(text.encode()).hexdigest()[:_HEX], **form}, allow_nan=False)
 
 
-def request_form(observation: Observation) -> dict[str, Any]:
-    """What was seen, as a request without its `id`: the form of an observation, with contacts and faces in place of the
-    name of a scenario."""
+def _request_form(observation: Observation) -> dict[str, Any]:
+    """A request without its `id`: the form of an observation, with contacts and faces in place of a scenario."""
     assembly = observation.assembly
     form = observation_form(observation, "")
     del form["scenario"]
@@ -94,45 +134,6 @@ def request_form(observation: Observation) -> dict[str, Any]:
 class _Answer(Table, frozen=True, kw_only=True):
     poses: list[PoseForm]
     id: str = ""
-
-
-def parse_answer(text: str, where: str) -> tuple[str, Array]:
-    """Parse an answer.
-
-    Args:
-        where: Where it stands, for the message.
-
-    Returns:
-        Its `id`, and its poses, (n, 4, 4), [m].
-
-    Raises:
-        InputError: It is no answer.
-    """
-    answer = convert_typed(parse_plain(text, where, "json"), _Answer, where)
-    poses = [form.matrix(f"{where}, pose {i}") for i, form in enumerate(answer.poses, start=1)]
-    return answer.id, np.array(poses).reshape(-1, 4, 4)
-
-
-def _start(command: tuple[str, ...], folder: str, request: bytes) -> subprocess.Popen[bytes]:
-    """Start a program in a session of its own; the request is a file, so that it may write before it reads."""
-    environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
-    pipe = subprocess.PIPE
-    with tempfile.TemporaryFile() as stdin:
-        stdin.write(request)
-        stdin.seek(0)
-        try:
-            return subprocess.Popen(
-                command, stdin=stdin, stdout=pipe, cwd=folder, env=environment, start_new_session=True
-            )
-        except OSError as error:
-            raise InputError(f"the program '{command[0]}' cannot be run ({error}).") from error
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a program, and its children where there are groups of processes."""
-    process.kill()
-    with suppress(AttributeError, ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
 
 
 def _face_form(face: Face | RoundFace) -> dict[str, Any]:

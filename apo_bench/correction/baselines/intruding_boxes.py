@@ -67,9 +67,9 @@ def _boxes(assembly: Assembly, part: str) -> list[Box]:
     return [piece for piece in assembly.solids[part].pieces if isinstance(piece, Box)]
 
 
-def intruding(meetings: Meeting, goals: Array) -> Equations:
-    """One equation, with e = -depth, for each two boxes that are inside each other at these goals."""
-    T = _between(meetings.words, goals)[meetings.word]
+def intruding(meetings: Meeting, poses: Array) -> Equations:
+    """One equation, with e = -depth, for each two boxes that are inside each other at these poses."""
+    T = _between(meetings.words, poses)[meetings.word]
     depth, axis, sign, reversed_ = _shortest(meetings, T)
     inside = np.flatnonzero(depth > 0)
     side = reversed_[inside].astype(np.intp)
@@ -94,10 +94,10 @@ def intruding(meetings: Meeting, goals: Array) -> Equations:
     )
 
 
-def _between(words: Equations, goals: Array) -> Array:
+def _between(words: Equations, poses: Array) -> Array:
     """D_a^-1 D_b of every arc, (w, 4, 4)."""
     half = len(words.letters) // 2
-    F = np.concatenate([words.start, goals, np.eye(4)[None]])[words.letters[:half]]
+    F = np.concatenate([words.start, poses, np.eye(4)[None]])[words.letters[:half]]
     F = np.where(words.inverse[:half, :, None, None], pose.inverse(F), F)
     T = np.broadcast_to(np.eye(4), (half, 4, 4))
     for j in range(F.shape[1]):

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.as_given import as_it_ends
+from apo_bench.correction.checks.as_given import execute_as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -22,7 +22,7 @@ EVALUATIONS = 300
 
 
 def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> Correction:
-    """The goals with the least sum of squares.
+    """The poses with the least sum of squares.
 
     Args:
         contact_m: Standard deviation of e, [m].
@@ -33,7 +33,7 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(
+    return execute_as_it_ends(
         observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
     )
 
@@ -46,11 +46,11 @@ def _solved(observation: Observation, contact_m: float) -> Array:
     prior = np.eye(6 * len(observation.poses))
 
     def residual(z: Array) -> Array:
-        return np.concatenate([system.residual(space.goals(z)) / contact_m, z])
+        return np.concatenate([system.residual(space.poses(z)) / contact_m, z])
 
     def jacobian(z: Array) -> Array:
-        _, J = system.linearised(space.goals(z))
+        _, J = system.linearised(space.poses(z))
         return np.concatenate([space.pulled(z, J) / contact_m, prior])
 
     settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
-    return space.goals(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)
+    return space.poses(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)

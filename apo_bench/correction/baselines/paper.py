@@ -9,7 +9,7 @@ from apo_bench.correction.solvers import solve_newton
 
 
 def paper(observation: Observation) -> Correction:
-    """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other goal by itself.
+    """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other pose by itself.
 
     Returns:
         `converged` if every |e| is within `observation.gap_m`; otherwise `not_seen` (nothing was changed),
@@ -22,18 +22,18 @@ def paper(observation: Observation) -> Correction:
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)
-    status = solver_status(solution, largest(system.gaps(solution.goals)), observation.gap_m)
-    goals = solution.goals
+    status = solver_status(solution, largest(system.gaps(solution.poses)), observation.gap_m)
+    poses = solution.poses
     if status == "converged":
-        for k in sorted(set(range(len(goals))).difference(freed)):
-            goals = solve_own_contacts(system, goals, k, observation.gap_m)
+        for k in sorted(set(range(len(poses))).difference(freed)):
+            poses = solve_own_contacts(system, poses, k, observation.gap_m)
     return Correction(
-        poses=goals,
+        poses=poses,
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=freed,
         gap_before_m=largest(before),
-        gap_after_m=largest(system.gaps(goals)),
+        gap_after_m=largest(system.gaps(poses)),
         rank=solution.rank,
         trace=solution.trace,
     )

@@ -19,7 +19,7 @@ import numpy as np
 from apo_bench.assembly import Correction, Equations, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.intruding_boxes import Meeting, intruding, meeting
-from apo_bench.correction.checks.as_given import as_it_ends
+from apo_bench.correction.checks.as_given import execute_as_it_ends
 from apo_bench.correction.solvers import Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
@@ -36,7 +36,7 @@ _TINY = 1e-8
 
 
 def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, length: float = LENGTH) -> Correction:
-    """The goals at which the descent ends.
+    """The poses at which the descent ends.
 
     Args:
         contact_m: Gap or depth that costs as much as one standard deviation of noise, [m].
@@ -48,7 +48,7 @@ def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, l
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(
+    return execute_as_it_ends(
         observation,
         lambda observation: _descended(observation, contact_m, length),
         f"the descent ended after {ADAM_STEPS} steps",
@@ -67,11 +67,11 @@ class Loss:
 
     def __call__(self, z: Array) -> tuple[float, Array]:
         """The loss and its gradient, (6 n,)."""
-        goals = self.space.goals(z)
+        poses = self.space.poses(z)
         value = float(z @ z)
         gradient = 2 * z
-        for system in (self.contacts, intruding(self.meetings, goals)):
-            e, J = system.linearised(goals)
+        for system in (self.contacts, intruding(self.meetings, poses)):
+            e, J = system.linearised(poses)
             value += float(e @ e) / self.contact_m**2
             gradient = gradient + 2 * (e @ self.space.pulled(z, J)) / self.contact_m**2
         return value, gradient
@@ -94,4 +94,4 @@ def _descended(observation: Observation, contact_m: float, length: float) -> Arr
         v = _SQUARE * v + (1 - _SQUARE) * g**2
         step = length * np.cos(0.5 * np.pi * t / ADAM_STEPS)
         z = z - step * (m / (1 - _MEAN**t)) / (np.sqrt(v / (1 - _SQUARE**t)) + _TINY)
-    return down.space.goals(z)
+    return down.space.poses(z)

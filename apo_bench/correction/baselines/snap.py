@@ -1,6 +1,6 @@
 """A baseline: every part snaps onto what it is put on, as parts do in an editor, and nothing is ever taken back.
 
-Operation by operation, the new goal alone is solved for the contacts that its own operation makes; earlier goals stay
+Operation by operation, the new pose alone is solved for the contacts that its own operation makes; earlier poses stay
 as they are. Where earlier errors leave no place at which all of them hold, their gaps are as small as can be in the
 sense of least squares.
 """
@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Equations, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.as_given import TWIST_UNITS, as_it_ends
+from apo_bench.correction.checks.as_given import TWIST_UNITS, execute_as_it_ends
 from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
@@ -18,7 +18,7 @@ _ITERATIONS = 30
 
 
 def snap(observation: Observation) -> Correction:
-    """Each goal onto the contacts of its own operation, by the most likely twist, in the order of the operations.
+    """Each pose onto the contacts of its own operation, by the most likely twist, in the order of the operations.
 
     Returns:
         `converged` with the gap that is left in the sentence, or `not_seen`.
@@ -26,19 +26,19 @@ def snap(observation: Observation) -> Correction:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(observation, _snapped, "every part was put onto its newest support")
+    return execute_as_it_ends(observation, _snapped, "every part was put onto its newest support")
 
 
 def _snapped(observation: Observation) -> Array:
-    goals = np.array(observation.poses)
+    poses = np.array(observation.poses)
     space = whitened(observation)
-    system = equations(observation.assembly, observation.start, goals)
-    for k in range(len(goals)):
-        goals[k] = _put(system.among(system.made == k), goals, k, space)
-    return goals
+    system = equations(observation.assembly, observation.start, poses)
+    for k in range(len(poses)):
+        poses[k] = _put(system.among(system.made == k), poses, k, space)
+    return poses
 
 
-def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
+def _put(own: Equations, poses: Array, k: int, space: Whitened) -> Array:
     """The pose of operation k, (4, 4), nearest to the seen one of those with the least sum of squared gaps.
 
     At each iteration the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15
@@ -46,7 +46,7 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     covariance V)^-1 (c + V^t xi).
     """
     coordinates = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
-    now = np.array(goals)
+    now = np.array(poses)
     z = np.zeros(6)
     for _ in range(_ITERATIONS):
         e, J = own.linearised(now)
@@ -58,7 +58,7 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
         wanted = fixed @ z - (U[:, :rank].T @ e) / w[:rank]
         step = np.linalg.lstsq(fixed, wanted, rcond=None)[0] - z
         z = z + step
-        now[k] = coordinates.goals(z)[0]
+        now[k] = coordinates.poses(z)[0]
         if np.linalg.norm(coordinates.factor[0] @ step * TWIST_UNITS) < REST_M:
             break
     return now[k]

@@ -37,7 +37,7 @@ def paper_track(observation: Observation) -> Correction:
 
     Returns:
         As `paper`; `freed` is what successful trials changed, `tried` every trial, rank and trace those of the last
-        one. If no set of candidates suffices, the steps before keep their corrected goals and there is no schedule.
+        one. If no set of candidates suffices, the steps before keep their corrected poses and there is no schedule.
     """
     return track_operations(observation, nested)
 
@@ -52,8 +52,8 @@ def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
 class TrackedOperation:
     """What one more operation asked for."""
 
-    goals: Array
-    """(n + 1, 4, 4): the goals now in force; those before if nothing sufficed."""
+    poses: Array
+    """(n + 1, 4, 4): the poses now in force; those before if nothing sufficed."""
     status: str
     freed: tuple[int, ...] = ()
     tried: tuple[Try, ...] = ()
@@ -74,9 +74,9 @@ def track_operations(observation: Observation, sets: _Sets) -> Correction:
         if steps[-1].status != "converged":
             return _report(observation, now, steps)
         back = reached_back(n, steps[-1].freed)
-        targets += [now[step.operation] if step.undo else steps[-1].goals[step.operation] for step in back]
+        targets += [now[step.operation] if step.undo else steps[-1].poses[step.operation] for step in back]
         schedule += back
-        now = np.concatenate([steps[-1].goals, now[n + 1 :]])
+        now = np.concatenate([steps[-1].poses, now[n + 1 :]])
     return _report(observation, now, steps, tuple(schedule), np.array(targets) if targets else None)
 
 
@@ -86,53 +86,53 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
-def next_operation(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
-    """What one more operation asks for: the last of these goals has just been observed, the others are in force."""
-    n = len(goals) - 1
-    system = equations(observation.assembly.first(n + 1), observation.start, goals)
-    failing = ~(system.gaps(goals) <= observation.gap_m)
+def next_operation(observation: Observation, poses: Array, sets: _Sets) -> TrackedOperation:
+    """What one more operation asks for: the last of these poses has just been observed, the others are in force."""
+    n = len(poses) - 1
+    system = equations(observation.assembly.first(n + 1), observation.start, poses)
+    failing = ~(system.gaps(poses) <= observation.gap_m)
     if not failing[system.made == n].any():
-        return TrackedOperation(solve_own_contacts(system, goals, n, observation.gap_m), "converged")
+        return TrackedOperation(solve_own_contacts(system, poses, n, observation.gap_m), "converged")
     chosen = candidates(observation.assembly.first(n + 1), failing)
     tried = list[Try]()
     last = None
     for free in sets(chosen):
-        last, left_m = _trial(system, goals, free, failing)
+        last, left_m = _trial(system, poses, free, failing)
         if not last.finite:
             break
         tried.append(Try(n, free, left_m))
         if left_m <= observation.gap_m:
-            return TrackedOperation(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
+            return TrackedOperation(last.poses, "converged", free, tuple(tried), last.rank, last.trace)
     status = "inconsistent" if last is None else solver_status(last, np.inf, observation.gap_m)
-    return TrackedOperation(goals, status, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
+    return TrackedOperation(poses, status, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
 
 
 def _trial(
-    system: Equations, goals: Array, free: tuple[int, ...], failing: NDArray[np.bool_]
+    system: Equations, poses: Array, free: tuple[int, ...], failing: NDArray[np.bool_]
 ) -> tuple[Solution, float]:
     """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
     chosen = system.containing(free)
-    solution = solve_newton(system.among(chosen), goals, free)
-    return solution, largest(system.gaps(solution.goals)[chosen | failing])
+    solution = solve_newton(system.among(chosen), poses, free)
+    return solution, largest(system.gaps(solution.poses)[chosen | failing])
 
 
 def _report(
     observation: Observation,
-    goals: Array,
+    poses: Array,
     steps: list[TrackedOperation],
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
     system = equations(observation.assembly, observation.start, observation.poses)
     status = steps[-1].status if steps else "converged"
-    last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, status))
+    last = next((step for step in reversed(steps) if step.trace), TrackedOperation(poses, status))
     return Correction(
-        poses=goals,
+        poses=poses,
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
         gap_before_m=largest(system.gaps(observation.poses)),
-        gap_after_m=largest(system.gaps(goals)),
+        gap_after_m=largest(system.gaps(poses)),
         rank=last.rank,
         trace=last.trace,
         tried=tuple(one for step in steps for one in step.tried),

@@ -1,6 +1,6 @@
 """Calibration of a robot by contact probing: hand-eye, encoders, tool, and how each part lies in the hand.
 
-A touch is a contact equation on the robot instead of on a goal: a point of the hand, or of what it holds, lies on a
+A touch is a contact equation on the robot instead of on a pose: a point of the hand, or of what it holds, lies on a
 known plane. `prior_estimate` begins with what is stated of the robot, `RobotEstimate.touch` learns from touches.
 """
 

@@ -25,7 +25,7 @@ from apo_bench.geometry import Array, copyable, freeze, frozen, pose
 from apo_bench.records.robot_error import Sigmas
 
 UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
-"""[mm, deg], where nobody states how wrong a robot is: a published automatic calibration of hand and eye ends at
+"""[mm, deg], of a robot whose errors are not stated: a published automatic calibration of hand and eye ends at
 0.93 mm and 0.27 degrees (arXiv 2311.01335)."""
 
 
@@ -197,9 +197,9 @@ def prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstim
     """The estimate before the first touch: no error, with the stated standard deviations.
 
     Args:
-        sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where nobody states them.
+        sigmas: Standard deviations, [mm] and [deg]; `UNKNOWN` where they are not stated.
         joints: How many joints the arm has.
-        middle: (3,), [m], world frame: the mean of the goals.
+        middle: (3,), [m], world frame: the mean of the poses.
     """
     require(joints >= 0, f"{joints} joints were given; give the number of joints of the arm.")
     mm, deg = sigmas.hand_eye

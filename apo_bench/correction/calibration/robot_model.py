@@ -26,7 +26,7 @@ class Places(NamedTuple):
     jacobian: Array
     """(t, 6, joints), [m/rad, rad/rad]; zeros: as if the encoders were exact."""
     T_tip_part: Array
-    """(t, 4, 4), [m]: where the part is believed; the identity for the tip."""
+    """(t, 4, 4), [m]: where the part is assumed; the identity for the tip."""
     grasp: Ints
     """(t,): which of the grasps that were made, from 0; -1: the hand is empty."""
 
@@ -49,7 +49,7 @@ def hand_eye_displacement(unknowns: Array, middle: Array) -> Array:
 
 
 def tip_displacement(unknowns: Array, J: Array) -> Array:
-    """exp(J delta) shift(tau), (4, 4): from where the robot believes its tip to where it is, but for E."""
+    """exp(J delta) shift(tau), (4, 4): from where the robot assumes its tip to where it is, but for E."""
     return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ pose.rigid(np.eye(3), unknowns[TOOL]))
 
 

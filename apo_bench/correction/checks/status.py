@@ -39,13 +39,13 @@ def opposing(observation: Observation, correction: Correction) -> Correction:
         return correction
     contact = assembly.given(assembly.relations()[int(np.argmax(away))].contact)
     sentence = (
-        f"the faces of {contact} look the same way at the goals that were found; a part was probably seen turned over"
+        f"the faces of {contact} look the same way at the poses that were found; a part was probably seen turned over"
     )
     return replace(correction, status="inconsistent", sentence=sentence, covariance=None)
 
 
 def refused_correction(observation: Observation) -> Correction:
-    """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
+    """What was observed, unchanged: an operation without a pose has no motion parameter to start from."""
     missing = int(np.argmin(observation.observed))
     now = largest_gap(observation.assembly, observation.start, observation.poses)
     return Correction(observation.poses, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)

@@ -1,1 +1,1 @@
-"""The corrector `contact`: its problem, the nearest goals, their test, other starts, and which relation to suspect."""
+"""The corrector `contact`: its problem, the nearest poses, their test, other starts, and which relation to suspect."""

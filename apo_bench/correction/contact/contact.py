@@ -37,7 +37,7 @@ DROPS = 3
 @check_arguments
 @dataclass(frozen=True)
 class ContactCorrector:
-    """Nearest consistent goals; what to do if the test of the correction fails is said beforehand."""
+    """Nearest consistent poses; what to do if the test of the correction fails is said beforehand."""
 
     doubt: Doubt = "warn"
     """`apply` says nothing, `warn` names the suspects and goes on, `refuse` does not go on (status `doubtful`), and
@@ -46,9 +46,9 @@ class ContactCorrector:
     level: float = TEST_LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
     elsewhere: bool = True
-    """Whether other starts are tried where what was seen leads to no solution, or far."""
+    """Whether other starts are tried where what was observed leads to no solution, or far."""
     compiled: bool = True
-    """Whether kernels are used where Numba is installed and can keep what it compiles: the same goals but for
+    """Whether kernels are used where Numba is installed and can keep what it compiles: the same poses but for
     rounding."""
 
     def __post_init__(self) -> None:
@@ -64,7 +64,7 @@ class ContactCorrector:
         Returns:
             `converged`, `not_seen`, `inconsistent` (a gap is left, mostly since the contacts contradict each other, or
             faces look the same way), `doubtful` (of `refuse` and `drop`: the test fails), `not_converged` (no gap is
-            left, but steps go on: these may not be the nearest goals) or `not_finite`; only the first is meant to be
+            left, but steps go on: these may not be the nearest poses) or `not_finite`; only the first is meant to be
             executed. `freed` are all operations that a contact depends on; `covariance` is the posterior.
 
         Raises:
@@ -131,7 +131,7 @@ class ContactCorrector:
             dropped += (self._most_suspect(problem, kept, worst[0]),)
             kept = problem.without(dropped)
             solved = solve(problem, kept)[0]
-        report = self._report(problem, 0, solved, before_m, dropped, test, turned_words(problem, solved.goals))
+        report = self._report(problem, 0, solved, before_m, dropped, test, turned_words(problem, solved.poses))
         return opposing(problem.observation, report)
 
     def _most_suspect(self, problem: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
@@ -159,14 +159,14 @@ class ContactCorrector:
         status = _status(solved, gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not solved.test.passes:
             status = "doubtful"
-        goals = solved.goals
-        if not np.isfinite(goals).all():
-            goals = problem.observations[i].poses
+        poses = solved.poses
+        if not np.isfinite(poses).all():
+            poses = problem.observations[i].poses
             status = "not_finite"
         of = f"every contact but those of {', '.join(dropped)}" if dropped else "every contact"
         doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
-            poses=goals,
+            poses=poses,
             status=status,
             sentence=status_sentence(status, gap_m, of) + turned + doubts,
             freed=problem.laid.pattern.freed,

@@ -27,7 +27,7 @@ def drawn_chi_squares(
         L: As of `noise_factor`.
         Jt: (6 n, 3 c), the transposed derivative of the equations by z, at a solution.
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
-        left_out: Operations whose goals are inferred, so that they agree with their contacts.
+        left_out: Operations whose poses are inferred, so that they agree with their contacts.
     """
     r = _drawn(observation, L, left_out) @ Jt
     # As `softened_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.

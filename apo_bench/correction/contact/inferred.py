@@ -1,8 +1,8 @@
-"""Where operations led whose observation is missing or not believed: inferred from their contacts and what is around.
+"""Where operations led whose observation is missing or not assumed: inferred from their contacts and what is around.
 
 A contact says that two normals oppose, that a point lies in a plane, and that two faces cover each other, so their
 middles are not far apart; or that two axes are one line. With the poses of all other operations in its equations known,
-a contact of an operation says this of its goal alone. The operation of which most is said is inferred first; then it is
+a contact of an operation says this of its pose alone. The operation of which most is said is inferred first; then it is
 known to the others. Longer than other files: what flat and round faces say, and the pose that follows, is one idea.
 """
 
@@ -19,14 +19,14 @@ from apo_bench.geometry import Array, pose, quarter_turns, remembered
 _APART = 0.1
 """Normals with a smaller singular value are in one plane, or along one line."""
 _PLANE_M = 1e-3
-"""How exactly a contact says where its plane is, beside how far middles of faces may be apart, [m]."""
+"""How exactly a contact states its plane, compared with how far middles of faces may be apart, [m]."""
 _SAME_WAY = 0.99
 
 
 _Lie = Literal["opposite", "along", "across"]
 """How two directions lie to each other: two normals, two axes of whichever sense, an axis and a normal."""
 _MOST_AXES = 6
-"""Axes whose senses are tried with each other; of more, each points as it was seen."""
+"""Axes whose senses are tried with each other; of more, each points as it was observed."""
 
 
 class Ends(NamedTuple):
@@ -69,33 +69,33 @@ class _Condition(NamedTuple):
         return (R @ self.own if self.ends.lie == "across" and self.of_first else self.way)[None]
 
 
-class Inferred(NamedTuple):
-    """Goals of which some were inferred."""
+class InferredPoses(NamedTuple):
+    """Poses of which some were inferred."""
 
-    goals: Array
+    poses: Array
     """(n, 4, 4)."""
     baseless: tuple[int, ...]
     """Operations of which no contact says anything: they are as they were given."""
 
 
-def inferred_goals(observation: Observation, unknown: Collection[int]) -> Inferred:
-    """The goals of an observation, those of `unknown` operations, counted from 0, replaced by what contacts say."""
-    goals = np.array(observation.poses)
+def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredPoses:
+    """The poses of an observation, those of `unknown` operations, counted from 0, replaced by what contacts say."""
+    poses = np.array(observation.poses)
     left = set(unknown)
     baseless = list[int]()
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
     for k in left:
-        if not np.isfinite(goals[k]).all():
-            goals[k] = np.eye(4)
+        if not np.isfinite(poses[k]).all():
+            poses[k] = np.eye(4)
     while left:
-        conditions = {k: _conditions(observation.assembly, start, goals, k, left) for k in sorted(left)}
+        conditions = {k: _conditions(observation.assembly, start, poses, k, left) for k in sorted(left)}
         k = max(conditions, key=lambda k: (_rank(conditions[k]), len(conditions[k]), -k))
         if conditions[k]:
-            goals[k] = _placed(conditions[k], goals[k])
+            poses[k] = _placed(conditions[k], poses[k])
         else:
             baseless.append(k)
         left.discard(k)
-    return Inferred(goals, tuple(sorted(baseless)))
+    return InferredPoses(poses, tuple(sorted(baseless)))
 
 
 @remembered
@@ -138,10 +138,10 @@ def _round_ends(assembly: Assembly, contact: Contact, stated: Contact) -> Ends |
     return ends._replace(reach_m=max(a.radius, b.radius), seated=True) if seats else None
 
 
-def _conditions(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Condition]:
+def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Collection[int]) -> list[_Condition]:
     """What contacts say of operation k that depend on no other operation of those left."""
     p = len(start)
-    poses = np.concatenate([start, goals])
+    stack = np.concatenate([start, poses])
     conditions = list[_Condition]()
     others = {p + other for other in left if other != k}
     for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
@@ -149,8 +149,8 @@ def _conditions(assembly: Assembly, start: Array, goals: Array, k: int, left: Co
         if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue
         j = letters.index(p + k)
-        before = pose.inverse(product(word[:j], poses))
-        behind = product(word[j + 1 :], poses)
+        before = pose.inverse(product(word[:j], stack))
+        behind = product(word[j + 1 :], stack)
         inverse = word[j].inverse
         a = before[:3, :3] @ ends.directions[0], pose.apply(before, ends.middles[0][None])[0]
         b = behind[:3, :3] @ ends.directions[1], pose.apply(behind, ends.middles[1][None])[0]
@@ -172,7 +172,7 @@ def _directions(own: Array) -> int:
 
 
 def _placed(conditions: Sequence[_Condition], seen: Array) -> Array:
-    """The pose that agrees best with what is said; what is not said of its orientation is as it was seen."""
+    """The pose that agrees best with what is stated; what is not said of its orientation is as it was observed."""
     T = np.eye(4)
     T[:3, :3] = R = _turned(conditions, seen[:3, :3])
     # The position minimises the squares of what each condition leaves: exact along the directions that a plane says,
@@ -226,7 +226,7 @@ def _beside(direction: Array, way: Array) -> Array:
 
 
 def _sensed(conditions: Sequence[_Condition], seen: Array) -> Array:
-    """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was seen."""
+    """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was observed."""
     own, way = (np.array([getattr(condition, name) for condition in conditions]) for name in ("own", "way"))
     axes = [i for i, condition in enumerate(conditions) if condition.ends.lie == "along"]
     if not axes:
@@ -243,7 +243,7 @@ def _sensed(conditions: Sequence[_Condition], seen: Array) -> Array:
 
 def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
     """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
-    # One direction leaves the turn about it: of the quarter turns of the other part the one nearest to what was seen.
+    # One direction leaves the turn about it: of the quarter turns of the other part the nearest one is taken.
     rank = _directions(own)
     if rank == 1:
         square = beside @ quarter_turns()

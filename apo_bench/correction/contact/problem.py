@@ -20,9 +20,8 @@ from apo_bench.correction.solvers import (
     CompactEquations,
     Inequalities,
     Kernels,
-    NearestGoals,
+    NearestPoses,
     ProjectedContacts,
-    batch_goals,
     bounded,
     compact_equations,
     correction_to,
@@ -30,6 +29,7 @@ from apo_bench.correction.solvers import (
     noise_factor,
     project_vertices,
     scales,
+    solve_batch,
 )
 from apo_bench.correction.solvers.kernels import kernels
 from apo_bench.geometry import Array, remembered
@@ -59,8 +59,8 @@ class Problem:
     """b observations of one assembly, with the same start poses and play, and what is asked of its c contacts."""
 
     observations: tuple[Observation, ...]
-    goals: Array
-    """(b, n, 4, 4), what was seen."""
+    poses: Array
+    """(b, n, 4, 4), what was observed."""
     L: Array
     """(b, n, 6, 6), or (b, n, 6, 6 n) where operations share errors."""
     laid: ProjectedContacts
@@ -96,7 +96,7 @@ class Problem:
         return replace(
             self,
             observations=self.observations[some],
-            goals=self.goals[some],
+            poses=self.poses[some],
             L=self.L[some],
             laid=self.laid.only(some),
             inequalities=self.inequalities[some],
@@ -108,17 +108,17 @@ class Problem:
         return self.observation.assembly.without(dropped)
 
     def seen_gap_m(self) -> list[float]:
-        """The largest |e| of all contacts at what was seen, [m], of each observation."""
-        return self.gaps(self.goals, self.laid.forms).max(axis=1, initial=0.0).tolist()
+        """The largest |e| of all contacts at what was observed, [m], of each observation."""
+        return self.gaps(self.poses, self.laid.forms).max(axis=1, initial=0.0).tolist()
 
-    def gaps(self, goals: Array, forms: Array | None = None) -> Array:
-        """The largest |e| of each contact, (b, c), [m], at goals (b, n, 4, 4), or how far an inequality is violated.
+    def gaps(self, poses: Array, forms: Array | None = None) -> Array:
+        """The largest |e| of each contact, (b, c), [m], at poses (b, n, 4, 4), or how far an inequality is violated.
 
         Args:
             forms: (b, c, 4), n D_a^-1 D_b of each contact there, if that is known.
         """
-        gaps = self.laid.gaps(self.laid.system.forms(goals) if forms is None else forms)
-        for own, wall, at in zip(gaps, self.inequalities, goals, strict=False):
+        gaps = self.laid.gaps(self.laid.system.forms(poses) if forms is None else forms)
+        for own, wall, at in zip(gaps, self.inequalities, poses, strict=False):
             own[~self.demands.exact] = wall.overstepped(at)
         return gaps
 
@@ -139,9 +139,9 @@ class Problem:
         """The equations of the contacts that are chosen, (c,)."""
         return self.laid.system if chosen.all() else self.laid.system.among(chosen)
 
-    def nearest(self, chosen: NDArray[np.bool_], soft_m: Array | None = None) -> NearestGoals:
-        """The nearest goals by some of the equations, demanded or given a standard deviation each, [m]."""
-        return batch_goals(self.among(chosen), self.goals, self.L, soft_m, self.begin, self.kernels)
+    def nearest(self, chosen: NDArray[np.bool_], soft_m: Array | None = None) -> NearestPoses:
+        """The nearest poses by some of the equations, demanded or given a standard deviation each, [m]."""
+        return solve_batch(self.among(chosen), self.poses, self.L, soft_m, self.begin, self.kernels)
 
 
 def problem_of(
@@ -152,8 +152,8 @@ def problem_of(
     Args:
         level: The test fails if the p-value is below.
         compiled: Whether kernels are used where Numba is installed.
-        at: Goals, (b, n, 4, 4), at which vertices are laid onto the other face of their contact and which the solver
-            begins with; None stands for those that were seen.
+        at: Poses, (b, n, 4, 4), at which vertices are laid onto the other face of their contact and which the solver
+            begins with; None stands for those that were observed.
 
     Raises:
         InputError: A covariance is not positive definite; several operations share errors.
@@ -161,11 +161,11 @@ def problem_of(
     first = observations[0]
     assembly = first.assembly
     shared = any(observation.shared for observation in observations)
-    goals = np.concatenate([observation.poses for observation in observations]).reshape(len(observations), -1, 4, 4)
+    poses = np.concatenate([observation.poses for observation in observations]).reshape(len(observations), -1, 4, 4)
     start = np.concatenate([np.zeros((0, 4)), *(first.start[part] for part in assembly.solids)]).reshape(-1, 4, 4)
     demands = _demands(assembly, first.play_m)
     by = kernels() if compiled else None
-    there = goals if at is None else at
+    there = poses if at is None else at
     laid = project_vertices(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
     if not demands.all_exact:
@@ -175,9 +175,9 @@ def problem_of(
     begin = (
         None
         if at is None
-        else np.array([correction_to(*observation) for observation in zip(goals, L, at, strict=True)])
+        else np.array([correction_to(*observation) for observation in zip(poses, L, at, strict=True)])
     )
-    return Problem(tuple(observations), goals, L, laid, demands, inequalities, level, by, begin)
+    return Problem(tuple(observations), poses, L, laid, demands, inequalities, level, by, begin)
 
 
 @remembered
@@ -212,7 +212,7 @@ def _factors(observations: Sequence[Observation]) -> Array:
 
 
 def seen_system(observation: Observation) -> CompactEquations:
-    """The equations of every contact, each vertex where it was seen."""
+    """The equations of every contact, each vertex where it was observed."""
     return compact_equations(
         equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
     )

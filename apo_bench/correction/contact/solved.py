@@ -12,7 +12,7 @@ from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.contact.squared_length import chi_square_test, chi_squares, relaxed_chi_square
 from apo_bench.correction.solvers import (
-    NearestGoals,
+    NearestPoses,
     active_rank,
     marginals,
     nearest_between,
@@ -21,8 +21,8 @@ from apo_bench.correction.solvers import (
 from apo_bench.geometry import Array
 
 FAR_DEG = 45.0
-"""A goal that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none
-turned a goal by more than 33 degrees; every one that was longer than the truth, at 25 and 40, did by 56 or more."""
+"""A pose that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none
+turned a pose by more than 33 degrees; every one that was longer than the truth, at 25 and 40, did by 56 or more."""
 _FAR = 1.0 + 2.0 * cos(radians(FAR_DEG))
 """The trace of the matrix of such a rotation."""
 
@@ -30,17 +30,17 @@ _FAR = 1.0 + 2.0 * cos(radians(FAR_DEG))
 class Solved(NamedTuple):
     """What some contacts ask of one observation."""
 
-    goals: Array
+    poses: Array
     """(n, 4, 4)."""
     z: Array
     """(6 n,): the correction in standard deviations."""
     at_rest: bool
     finite: bool
     trace: Sequence[tuple[float, float]]
-    """As of `NearestGoals`."""
+    """As of `NearestPoses`."""
     test: Consistency
     gaps: Array
-    """(c,): the largest |e| of each contact at the goals, [m]; or how far an inequality is violated."""
+    """(c,): the largest |e| of each contact at the poses, [m]; or how far an inequality is violated."""
     worst_m: float
     """The largest of those."""
     kept_m: float
@@ -52,13 +52,13 @@ class Solved(NamedTuple):
     covariance: Array | None
     """(n, 6, 6), of the body twists there, [m, rad]; None of very many operations."""
     far: bool
-    """Whether a goal is turned so far that a local minimum is to be feared."""
+    """Whether a pose is turned so far that a local minimum is to be feared."""
 
 
 def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
-    """The nearest goals of each observation by the contacts that are `kept`, (c,), and the test of the correction.
+    """The nearest poses of each observation by the contacts that are `kept`, (c,), and the test of the correction.
 
-    Contacts that contradict each other have no nearest goals; those that share the contradiction out are returned.
+    Contacts that contradict each other have no nearest poses; those that share the contradiction out are returned.
     """
     chosen = kept & problem.demands.exact
     nearest = problem.nearest(chosen)
@@ -85,7 +85,7 @@ def tested(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
 
 
 def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
-    """How hard each contact pulls at the goals of one observation, (c,), by the multipliers of its equations."""
+    """How hard each contact pulls at the poses of one observation, (c,), by the multipliers of its equations."""
     chosen = kept & problem.demands.exact
     soft = np.hypot(problem.slack(chosen), CONTRADICTION_M)
     multipliers = np.zeros((len(chosen), 3))
@@ -93,35 +93,35 @@ def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
     return np.asarray(np.square(multipliers).sum(axis=1))
 
 
-def turned_far(observed: Array, goals: Array) -> NDArray[np.bool_]:
-    """Whether a correction turns a goal so far that a local minimum is to be feared: (b, n, 4, 4) -> (b,)."""
+def turned_far(observed: Array, poses: Array) -> NDArray[np.bool_]:
+    """Whether a correction turns a pose so far that a local minimum is to be feared: (b, n, 4, 4) -> (b,)."""
     # The trace of R_seen^t R is 1 + 2 cos of the angle between them.
-    traces = np.einsum("bnij,bnij->bn", observed[:, :, :3, :3], goals[:, :, :3, :3])
+    traces = np.einsum("bnij,bnij->bn", observed[:, :, :3, :3], poses[:, :, :3, :3])
     return np.asarray(traces.min(axis=1, initial=3.0) < _FAR)
 
 
-def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, chi_square: list[float]) -> list[Solved]:
-    """What is to say of each of the nearest goals, given the squared lengths of corrections, (b,)."""
+def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses, chi_square: list[float]) -> list[Solved]:
+    """What is to say of each of the nearest poses, given the squared lengths of corrections, (b,)."""
     all_kept = bool(kept.all())
-    goals = nearest.goals
-    forms = nearest.forms if all_kept and problem.demands.all_exact else problem.laid.system.forms(goals)
-    gaps = problem.gaps(goals, forms)
+    poses = nearest.poses
+    forms = nearest.forms if all_kept and problem.demands.all_exact else problem.laid.system.forms(poses)
+    gaps = problem.gaps(poses, forms)
     worst_m = gaps.max(axis=1, initial=0.0).tolist()
     kept_m = worst_m if all_kept else gaps[:, kept].max(axis=1, initial=0.0).tolist()
     away = np.any(problem.laid.faces_away(forms), axis=1).tolist()
-    far = turned_far(problem.goals, goals).tolist()
+    far = turned_far(problem.poses, poses).tolist()
     at_rest = nearest.at_rest.tolist()
     finite = nearest.finite.tolist()
     rank, free_projection = projections(nearest.Jt)
     covariance = [None] * len(rank) if free_projection is None else marginals(nearest.B, free_projection)
     tests = [Consistency(x, r, p_value(x, r), problem.level) for x, r in zip(chi_square, rank, strict=True)]
-    before = goals, nearest.z, at_rest, finite, nearest.trace, tests
+    before = poses, nearest.z, at_rest, finite, nearest.trace, tests
     return [
         Solved._make(fields) for fields in zip(*before, gaps, worst_m, kept_m, away, rank, covariance, far, strict=True)
     ]
 
 
-def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals) -> Solved:
+def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses) -> Solved:
     """The same of one observation whose contacts contradict each other, or that has walls or tails.
 
     Active inequalities count like equations: given which they are, the squared length is chi-square
@@ -131,12 +131,12 @@ def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestG
     exact = problem.demands.exact
     chosen = kept & exact
     chi_square, degrees = relaxed_chi_square(problem, chosen, nearest)
-    if nearest.finite[0] and largest(problem.gaps(nearest.goals)[:, chosen]) > problem.observation.gap_m:
+    if nearest.finite[0] and largest(problem.gaps(nearest.poses)[:, chosen]) > problem.observation.gap_m:
         nearest = problem.nearest(chosen, np.hypot(problem.slack(chosen), CONTRADICTION_M))
     elif nearest.finite[0] and not exact[kept].all():
         inequalities = problem.inequalities[0].among(kept[~exact])
         start = nearest.at(0)
-        held = nearest_between(problem.among(chosen).only(0), inequalities, problem.goals[0], problem.L[0], start)
+        held = nearest_between(problem.among(chosen).only(0), inequalities, problem.poses[0], problem.L[0], start)
         chi_square += float(held.z @ held.z - start.z @ start.z)
         degrees += active_rank(start.Jt, inequalities, held)
         nearest = held.batch()

@@ -12,13 +12,13 @@ from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value, sof
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers import (
-    NearestGoals,
+    NearestPoses,
     jacobian_rank,
 )
 from apo_bench.geometry import Array
 
 
-def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[Array, NDArray[np.bool_]]:
+def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses) -> tuple[Array, NDArray[np.bool_]]:
     """Squared lengths of corrections, (b,), and whether those are what the test asks for, (b,), as they stand.
 
     They are if the contacts hold and what play leaves needs no further solution; else it is `relaxed_chi_square`.
@@ -33,7 +33,7 @@ def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoa
     return np.square(nearest.z).sum(axis=1), holds
 
 
-def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[float, int]:
+def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses) -> tuple[float, int]:
     """The squared length of one correction and its degrees of freedom, the rank.
 
     Where contacts contradict each other, or fit with play, the solver runs once more, with a standard deviation for
@@ -56,7 +56,7 @@ def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: Nea
 
 
 def chi_square_test(
-    problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals, chi_square: float, degrees: int
+    problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPoses, chi_square: float, degrees: int
 ) -> Consistency:
     """The test of one squared length with its degrees of freedom, by the chi-square distribution.
 

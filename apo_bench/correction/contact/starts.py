@@ -1,9 +1,9 @@
-"""Where else to begin: what was seen may lead to a solution that is none, or to one that is longer than need be.
+"""Where else to begin: what was observed may lead to a solution that is none, or to one that is longer than need be.
 
-Goals that are turned far see equations that bend: the solver may end with faces that look the same way, with contacts
-that do not hold, or in a local minimum. Other starts come from contacts, which say how a part must lie on others, and
-from symmetry: a part that looks the same when it is turned may have been seen turned. Of the solutions that they lead
-to the one nearest to what was seen is taken, in the metric of the noise.
+Poses that are turned far see equations that bend: the solver may end with faces that look the same way, with contacts
+that do not hold, or in a local minimum. Other starts come from contacts, which state how a part must lie on others, and
+from symmetry: a part that looks the same when it is turned may have been observed turned. Of all solutions the one
+nearest to what was observed is taken, in the metric of the noise.
 """
 
 from collections.abc import Collection, Iterator
@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import faces_away, largest
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.contact.inferred import inferred_goals
+from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
 from apo_bench.correction.solvers import (
@@ -20,7 +20,7 @@ from apo_bench.correction.solvers import (
     LARGEST_POSTERIOR,
     correction_to,
     descended,
-    nearest_goals,
+    nearest_poses,
     project_vertices,
     scales,
 )
@@ -38,18 +38,18 @@ def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
     Where faces look at each other nearby and contacts do not hold, they contradict each other wherever one begins.
 
     Args:
-        first: What comes of beginning with what was seen.
+        first: What comes of beginning with what was observed.
     """
-    observed = problem.goals[0]
+    observed = problem.poses[0]
     usable = _holds(problem, first)
-    if not first.far and (usable or _faces_oppose(problem, observed, first.goals)):
+    if not first.far and (usable or _faces_oppose(problem, observed, first.poses)):
         return problem, first
     if 6 * len(observed) > LARGEST_POSTERIOR:
         return problem, first
     usable = usable and _is_flush(problem, first)
     length = float(first.z @ first.z) * _SHORTER if usable else np.inf
-    for goals in _solutions(problem, _starts(problem, first)):
-        begun = _begun_at(problem, goals)
+    for poses in _solutions(problem, _starts(problem, first)):
+        begun = _begun_at(problem, poses)
         if begun.begin is None or np.square(begun.begin).sum() >= length:
             break
         solved = solve(begun, begun.all_contacts)[0]
@@ -58,11 +58,11 @@ def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
     return problem, first
 
 
-def turned_words(problem: Problem, goals: Array) -> str:
-    """Which operations the corrected goals say to have been seen turned, if another start was needed to find them."""
+def turned_words(problem: Problem, poses: Array) -> str:
+    """State which operations were observed turned, if another start was needed to find the corrected poses."""
     if problem.begin is None:
         return ""
-    R = np.swapaxes(problem.observation.poses[:, :3, :3], 1, 2) @ goals[:, :3, :3]
+    R = np.swapaxes(problem.observation.poses[:, :3, :3], 1, 2) @ poses[:, :3, :3]
     angles = np.degrees(np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
     far = [f"operation {k + 1} by {angle:.0f} degrees" for k, angle in enumerate(angles) if angle > FAR_DEG]
     return f"; seen turned: {', '.join(far)}" if far else ""
@@ -71,56 +71,56 @@ def turned_words(problem: Problem, goals: Array) -> str:
 def _holds(problem: Problem, solved: Solved) -> bool:
     """Whether every contact holds with faces that look at each other."""
     holds = solved.at_rest and solved.finite and solved.worst_m <= problem.observation.gap_m
-    return bool(holds and _faces_oppose(problem, solved.goals))
+    return bool(holds and _faces_oppose(problem, solved.poses))
 
 
-def _faces_oppose(problem: Problem, *goals: Array) -> bool:
-    """Whether the faces of every contact look at each other, at each of some goals."""
-    return not faces_away(problem.observation.assembly, problem.observation.start, np.array(goals)).any()
+def _faces_oppose(problem: Problem, *poses: Array) -> bool:
+    """Whether the faces of every contact look at each other, at each of some poses."""
+    return not faces_away(problem.observation.assembly, problem.observation.start, np.array(poses)).any()
 
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
-    """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
-    return largest(_begun_at(problem, solved.goals).gaps(solved.goals[None])) <= problem.observation.gap_m
+    """Whether contacts also hold with vertices laid where the poses are: seen edge-on, they lie on one line."""
+    return largest(_begun_at(problem, solved.poses).gaps(solved.poses[None])) <= problem.observation.gap_m
 
 
-def _begun_at(problem: Problem, goals: Array) -> Problem:
-    """The same, begun with goals, (n, 4, 4), and vertices laid there."""
-    return problem_of(problem.observations, problem.level, problem.kernels is not None, goals[None])
+def _begun_at(problem: Problem, poses: Array) -> Problem:
+    """The same, begun with poses, (n, 4, 4), and vertices laid there."""
+    return problem_of(problem.observations, problem.level, problem.kernels is not None, poses[None])
 
 
 def _starts(problem: Problem, first: Solved) -> Array:
-    """Goals to begin with, (b, n, 4, 4)."""
+    """Poses to begin with, (b, n, 4, 4)."""
     observation = problem.observation
     doubted = _doubted(problem, first)
     n = len(observation.poses)
-    starts = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
+    starts = [infer_poses(observation, some).poses for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.poses]
     for k in doubted:
         for g in symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
-            goals = np.array(observation.poses)
-            goals[k] = goals[k] @ g
-            turned.append(goals)
+            poses = np.array(observation.poses)
+            poses[k] = poses[k] @ g
+            turned.append(poses)
     away = faces_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
-    return np.array([*starts, *(goals for goals, count in zip(turned, away, strict=True) if count < away[0])])
+    return np.array([*starts, *(poses for poses, count in zip(turned, away, strict=True) if count < away[0])])
 
 
 def _doubted(problem: Problem, first: Solved) -> Collection[int]:
-    """The operations of which one may be seen far off: all, or those with a part in most contacts that do not hold."""
+    """The operations that may be far off: all, or those with a part in most contacts that do not hold."""
     observation = problem.observation
     n = len(problem.observation.poses)
     if n <= _MOST:
         return range(n)
-    bad = faces_away(observation.assembly, observation.start, first.goals)
+    bad = faces_away(observation.assembly, observation.start, first.poses)
     bad |= ~(first.gaps <= observation.gap_m)
     letters = pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
-    turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.goals[:, :3, :3])
+    turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.poses[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
 
 
 def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
-    """Goals, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
+    """Poses, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
     observation = problem.observation
     (b, n, *_) = starts.shape
     L = scales(observation.covariance)
@@ -130,19 +130,19 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     z = correction_to(observation.poses, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.poses, starts.shape)
-        results = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
+        results = [nearest_poses(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
     else:
         result = (system.only(i) for i in range(b))
-        results = [nearest_goals(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]
-    goals = np.concatenate([result.goals.reshape(-1, n, 4, 4) for result in results])
+        results = [nearest_poses(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]
+    poses = np.concatenate([result.poses.reshape(-1, n, 4, 4) for result in results])
     rest = np.concatenate([np.atleast_1d(result.at_rest) for result in results])
     e = np.concatenate([np.atleast_2d(result.e) for result in results])
-    holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
-    holds &= ~faces_away(observation.assembly, observation.start, goals).any(axis=1)
+    holds = np.isfinite(poses).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
+    holds &= ~faces_away(observation.assembly, observation.start, poses).any(axis=1)
     # The nearest first, since only the nearest that holds is of use.
-    z = correction_to(observation.poses, problem.L[0], goals[holds])
+    z = correction_to(observation.poses, problem.L[0], poses[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:
-            yield goals[i]
+            yield poses[i]
         else:
-            yield descended(system.only(int(i)), observation.poses, L, goals[i])
+            yield descended(system.only(int(i)), observation.poses, L, poses[i])

@@ -1,4 +1,4 @@
-"""What contacts say of a hypothesis that is not solved: they are linearised once, at what is believed."""
+"""What contacts say of a hypothesis that is not solved: they are linearised once, at what is assumed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,11 +14,11 @@ from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
 from apo_bench.correction.robust.hypotheses import (
     Case,
-    believed_observation,
+    assumed_observation,
     prior_surprise,
     soft_deviation,
     softened,
-    unbelieved,
+    untrusted,
 )
 from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 
@@ -26,38 +26,38 @@ _LEVER_M = 0.1
 """What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
 
 
-def expected_badness(case: Case, states: States, dropped: tuple[str, ...], believed: Observation) -> float:
+def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assumed: Observation) -> float:
     """About what `SolvedHypothesis.badness` will be, if there is a solution.
 
     Args:
-        believed: The `believed_observation` of the states.
+        assumed: The `assumed_observation` of the states.
     """
-    left_out = unbelieved(states)
-    wide = np.array(believed.covariance)
+    left_out = untrusted(states)
+    wide = np.array(assumed.covariance)
     wide[list(left_out)] = ROOM
-    e, Jt = linearised_by(seen_system(believed), believed.poses, noise_factor(replace(believed, covariance=wide)))
-    _, soft = softened(believed, dropped)
+    e, Jt = linearised_by(seen_system(assumed), assumed.poses, noise_factor(replace(assumed, covariance=wide)))
+    _, soft = softened(assumed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)
-    beyond = _beyond_linear(believed, left_out)
+    beyond = _beyond_linear(assumed, left_out)
     square = e @ np.linalg.solve(S + beyond * beyond * np.eye(len(e)), e)
     return float(square + np.linalg.slogdet(S)[1]) + prior_surprise(case, states, dropped)
 
 
-def _beyond_linear(believed: Observation, unknown: Sequence[int]) -> float:
+def _beyond_linear(assumed: Observation, unknown: Sequence[int]) -> float:
     """How far points move beyond what is linear if parts are turned by their noise, [m]."""
-    known = np.delete(believed.covariance, unknown, axis=0)
+    known = np.delete(assumed.covariance, unknown, axis=0)
     turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
     return float(turned * turned * _LEVER_M)
 
 
 @final
 class ContactAgreement:
-    """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
+    """How well contacts agree that none of some operations has a part in, linearised once at what was observed."""
 
     def __init__(self, case: Case, states: States) -> None:
-        seen = believed_observation(case, states)
-        self._unknown = unbelieved(states)
+        seen = assumed_observation(case, states)
+        self._unknown = untrusted(states)
         system = seen_system(seen)
         self._e, self._Jt = linearised_by(system, seen.poses, noise_factor(seen))
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
@@ -79,7 +79,7 @@ class ContactAgreement:
         return p_value(self._square(rows), jacobian_rank(self._Jt[:, rows]))
 
     def disagreement(self) -> float:
-        """The squared length of what all that is believed leaves, in standard deviations."""
+        """The squared length of what all that is assumed leaves, in standard deviations."""
         return self._square(np.repeat(self._kept((), ()), 3))
 
     def _kept(self, left_out: Sequence[int], contacts: Sequence[int]) -> NDArray[np.bool_]:

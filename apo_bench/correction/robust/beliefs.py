@@ -38,7 +38,7 @@ _SURE_OF_RATE = 5.0
 
 
 class Sighting(NamedTuple):
-    """An operation as it was seen once."""
+    """An operation as it was observed once."""
 
     goal: Array
     """(4, 4)."""
@@ -49,7 +49,7 @@ class Sighting(NamedTuple):
     before: tuple[Array, Array] | None = None
     """Where its part was before, (4, 4), and the covariance of that, (6, 6); None if that is not known."""
     ray: Array | None = None
-    """(3,), the ray on which it was seen, in the frame of the part; None if that is not known."""
+    """(3,), the ray on which it was observed, in the frame of the part; None if that is not known."""
     others: tuple[int, ...] = ()
     """Operations whose view may have been exchanged for this one."""
 
@@ -60,18 +60,18 @@ def swapped_with(k: int) -> int:
 
 
 def says_nothing(belief: int) -> bool:
-    """Whether a view that is believed so tells nothing of the goal."""
+    """Whether a view that is assumed so tells nothing of the pose."""
     return belief in (GROSS, STALE)
 
 
 def alternatives(view: Sighting) -> list[int]:
-    """What may be believed of a view by itself."""
+    """What may be assumed of a view by itself."""
     stale = [] if view.before is None else [STALE]
     return [INLIER, BROAD, GROSS, SHIFTED, *stale, *range(FLIPPED, FLIPPED + len(view.flips))]
 
 
 def reading(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Array]:
-    """What a view that is believed so says of the goal: a pose, (4, 4), and its covariance, (6, 6)."""
+    """What a view that is assumed so says of the pose: a pose, (4, 4), and its covariance, (6, 6)."""
     if belief == BROAD:
         return view.goal, view.covariance * model.times**2
     if belief == SHIFTED:
@@ -80,7 +80,7 @@ def reading(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Ar
         C[:3, :3] += SHIFT_M**2 * along
         return view.goal, C
     if belief >= FLIPPED:
-        # The true goal is T F where T was seen, so a body twist xi at T is Ad(F^-1) xi there.
+        # The true pose is T F where T was observed, so a body twist xi at T is Ad(F^-1) xi there.
         F = view.flips[belief - FLIPPED]
         A = pose.adjoint(pose.inverse(F))
         C = A @ view.covariance @ A.T
@@ -89,7 +89,7 @@ def reading(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Ar
 
 
 def share(view: Sighting, belief: int, model: OutlierModel) -> float:
-    """How often a view is so, beside how often it is an inlier."""
+    """How often a view is so, relative to how often it is an inlier."""
     inlier = 1.0 - model.gross - model.broad
     flips = len(view.flips)
     kinds = {SHIFTED: model.shift, STALE: model.stale if view.before is not None else 0.0}
@@ -113,14 +113,14 @@ def log_volume(covariance: Array) -> float:
 
 
 def unlikelihood(apart: Array, covariance: Array) -> float:
-    """-2 log of how dense a Gaussian is at a twist, (6,), beside poses that may be anywhere."""
+    """-2 log of how dense a Gaussian is at a twist, (6,), relative to poses that may be anywhere."""
     square = float(apart @ np.linalg.solve(covariance, apart))
     return square + log_volume(covariance) - log_volume(ROOM)
 
 
 def surprise(views: Sequence[Sighting], state: State, model: OutlierModel) -> float:
-    """-2 log of how likely a state of the views of one operation is, beside inliers; and of what was seen, as far as
-    that does not depend on the goal."""
+    """-2 log of how likely a state of the views of one operation is, relative to inliers; and of the views, as far as
+    that does not depend on the pose."""
     total = 0.0
     for j, (view, belief) in enumerate(zip(views, state, strict=True)):
         chance = share(view, belief, model)
@@ -135,10 +135,10 @@ def surprise(views: Sequence[Sighting], state: State, model: OutlierModel) -> fl
     return total
 
 
-def _alike(earlier: Sighting, believed: int, view: Sighting, belief: int) -> float:
-    """How dense a view is that repeats what was false in an earlier one, beside poses that may be anywhere."""
+def _alike(earlier: Sighting, assumed: int, view: Sighting, belief: int) -> float:
+    """How dense a view is that repeats what was false in an earlier one, relative to poses that may be anywhere."""
     if belief >= FLIPPED:
-        return float(belief == believed)
+        return float(belief == assumed)
     if not says_nothing(belief):
         return 0.0
     # What repeats is where the earlier view is, within the noise of both.
@@ -147,7 +147,7 @@ def _alike(earlier: Sighting, believed: int, view: Sighting, belief: int) -> flo
 
 
 def is_false(belief: int) -> bool:
-    """Whether a view that is believed so is wrong by more than noise."""
+    """Whether a view that is assumed so is wrong by more than noise."""
     return belief not in (INLIER, BROAD)
 
 

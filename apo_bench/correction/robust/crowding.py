@@ -1,6 +1,6 @@
-"""Where parts may be of which too little was seen: beside the others, not inside them, and well on what they lie on.
+"""Where parts may be that were hardly observed: next to the others, not inside them, and well on what they lie on.
 
-Contacts fix a part of the goal that was left out. What they leave free is chosen among a few places about the one
+Contacts fix a part of the pose that was left out. What they leave free is chosen among a few places about the one
 that was inferred: the one where faces of contacts cover each other, then where parts are least inside each other, and
 of these the one where faces cover most.
 """
@@ -21,7 +21,7 @@ _COVERED = 0.02
 """Faces that touch cover at least this part of the smaller one."""
 _FREE_M = 2e-3
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
-"""A direction is free if the goal may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
+"""A direction is free if the pose may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
 _EQUAL = 1e-6
 """Variances that differ by less than this part are equal but for rounding."""
 _DEEP_M = 5e-4
@@ -29,7 +29,7 @@ _DEEP_M = 5e-4
 
 
 class Crowding(NamedTuple):
-    """What is wrong with goals that satisfy all equations, the worst first."""
+    """What is wrong with poses that satisfy all equations, the worst first."""
 
     missed: int
     """Contacts whose faces do not cover each other."""
@@ -39,30 +39,30 @@ class Crowding(NamedTuple):
     """How much of the smaller face contacts leave bare, all together."""
 
 
-def crowding(observation: Observation, goals: Array, best: Crowding | None = None) -> Crowding | None:
-    """How much parts are in each other's way, or beside each other, if the goals, (n, 4, 4), are reached exactly.
+def crowding(observation: Observation, poses: Array, best: Crowding | None = None) -> Crowding | None:
+    """How much parts are in each other's way, or next to each other, if the poses, (n, 4, 4), are reached exactly.
 
     Returns:
         None if that is worse than `best`, as soon as that is known.
     """
     assembly = observation.assembly
-    at = placements(assembly, observation.start, goals)
+    at = placements(assembly, observation.start, poses)
     missed = 0
     bare = 0.0
-    for operation, poses in zip(assembly.operations, at, strict=True):
+    for operation, placed in zip(assembly.operations, at, strict=True):
         for m, e in dict.fromkeys(map(assembly.given, operation.contacts)):
-            covered = _covered(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+            covered = _covered(assembly.face_of(m), placed[m.part], assembly.face_of(e), placed[e.part])
             bare = bare + 1.0 - covered
             missed = missed + (covered < _COVERED)
             if best is not None and missed > best.missed:
                 return None
     depth = 0.0
-    for operation, poses in zip(assembly.operations, at, strict=True):
+    for operation, placed in zip(assembly.operations, at, strict=True):
         touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
         for part in operation.moves:
             for other in assembly.solids:
                 if other not in operation.moves and frozenset((part, other)) not in touching:
-                    deep = intrusion(assembly.solids[part], poses[part], assembly.solids[other], poses[other])
+                    deep = intrusion(assembly.solids[part], placed[part], assembly.solids[other], placed[other])
                     depth += deep if deep > _DEEP_M else 0.0
         if best is not None and (missed, depth) > best[:2]:
             return None
@@ -101,29 +101,29 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
 
 def least_crowded(
     observation: Observation,
-    goals: Array,
+    poses: Array,
     covariance: Array,
     doubted: tuple[int, ...],
     solve: Callable[[Array], Array | None],
 ) -> Array | None:
-    """Goals at which parts touch that should, and no others, as far as places that are tried allow.
+    """Poses at which parts touch that should, and no others, as far as places that are tried allow.
 
     Args:
-        goals: (n, 4, 4), consistent.
+        poses: (n, 4, 4), consistent.
         covariance: (n, 6, 6), of the body twists by which they may be wrong, [m, rad].
         doubted: The operations whose observation was left out.
-        solve: Goals as they are inferred, (n, 4, 4) -> consistent goals, or None where there are none.
+        solve: Poses as they are inferred, (n, 4, 4) -> consistent poses, or None where there are none.
 
     Returns:
-        None if the given goals are as good as any that were tried, or nothing is wrong with them.
+        None if the given poses are as good as any that were tried, or nothing is wrong with them.
     """
-    best = crowding(observation, goals)
+    best = crowding(observation, poses)
     assert best is not None
     roomiest = None
     for k in doubted:
         if best.missed == 0 and best.depth == 0.0:
             break
-        base = goals if roomiest is None else roomiest
+        base = poses if roomiest is None else roomiest
         for T in places(base[k], covariance[k], max(LEAST_PLACES, PLACES_TRIED // len(doubted))):
             moved = np.array(base)
             moved[k] = T

@@ -1,4 +1,4 @@
-"""Which observations are outliers is part of the estimate: hypotheses of that, and how likely what was seen makes them.
+"""Which observations are outliers is part of the estimate: hypotheses of that, and how likely the views make them.
 
 Given the states of all views, what contacts leave at the observation is Gaussian, with covariance J C J^t and what
 play and curvature add, so hypotheses are compared by the likelihood of that; what no contact tells does not count. A
@@ -20,7 +20,7 @@ from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
-from apo_bench.correction.contact.inferred import inferred_goals
+from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.contact.problem import problem_of, seen_system
 from apo_bench.correction.robust.beliefs import DISPLACED, INLIER, ROOM, VIEW, State, States, says_nothing, together
 from apo_bench.correction.robust.noise_scale import (
@@ -37,10 +37,10 @@ from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
-"""Parts that are believed to be turned by less (a standard deviation) are not far from where they were seen: no other
-start is tried, and what is far nevertheless is an outlier."""
+"""Parts that are assumed to be turned by less (a standard deviation) are not far from the observed ones: no other start
+is tried, and what is far nevertheless is an outlier."""
 UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
-"""(6, 6): how far the goal of an operation that was left out may be from what its contacts say of it, [m, rad]."""
+"""(6, 6): how far the pose of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 _WRONG_M = 0.05
 """Faces that a wrong relation names may be so far apart."""
 
@@ -68,31 +68,31 @@ class Case:
 @final
 @dataclass(frozen=True, eq=False)
 class SolvedHypothesis:
-    """What is believed, and what comes of that."""
+    """What is assumed, and what comes of that."""
 
     case: Case
     states: States
     dropped: tuple[str, ...]
-    """Relations that are not believed."""
+    """Relations that are not assumed."""
     observation: Observation
-    """Views merged, and operations of which none is believed where contacts say, with `UNKNOWN`."""
+    """Views merged, and operations of which none is assumed where contacts say, with `UNKNOWN`."""
     correction: Correction
     scale: float = 1.0
     """How much larger than stated the noise of all views is."""
 
     @property
     def key(self) -> tuple[States, tuple[str, ...], bool]:
-        """What it believes."""
+        """What it assumes."""
         return self.states, self.dropped, self.scale > 1.0
 
     @property
     def left_out(self) -> tuple[int, ...]:
-        """Operations of which no view is believed."""
-        return unbelieved(self.states)
+        """Operations of which no view is assumed."""
+        return untrusted(self.states)
 
     @property
     def doubts(self) -> bool:
-        """Whether anything is not believed as it was stated."""
+        """Whether anything is not assumed as it was stated."""
         return (
             bool(self.dropped)
             or self.scale > 1.0
@@ -125,7 +125,7 @@ class SolvedHypothesis:
         return float(unlikely + surprise)
 
     def noisier(self) -> SolvedHypothesis:
-        """The same if all noise is larger than stated, by as much as is likeliest: the goals stay."""
+        """The same if all noise is larger than stated, by as much as is likeliest: the poses stay."""
         test = self.correction.test
         if test is None or self.scale > 1.0 or self.observation.shared:
             return self
@@ -134,12 +134,12 @@ class SolvedHypothesis:
 
     @property
     def stated(self) -> Observation:
-        """What is believed with the noise that is."""
+        """What is assumed with the noise that is."""
         return noisier(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
 
     @property
     def covariance(self) -> Array | None:
-        """Of the goals, (n, 6, 6), [m, rad], with the noise that is."""
+        """Of the poses, (n, 6, 6), [m, rad], with the noise that is."""
         C = self.correction.covariance
         return C if C is None or self.scale == 1.0 else C * self._region_scale**2
 
@@ -147,26 +147,26 @@ class SolvedHypothesis:
     def _region_scale(self) -> float:
         return region_scale(self.scale, self.correction.test.freedom) if self.correction.test else self.scale
 
-    def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
-        """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
-        moved = self._moved(goals, unknown)
+    def at(self, poses: Array, unknown: Sequence[int]) -> SolvedHypothesis:
+        """The same with the inferred poses of some operations elsewhere, at these of poses (n, 4, 4)."""
+        moved = self._moved(poses, unknown)
         correction = tested(moved, _corrected(moved, self.dropped), self.left_out)
         return replace(self, observation=moved, correction=correction)
 
-    def goals_at(self, goals: Array, unknown: Sequence[int]) -> Array | None:
-        """Its goals, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
-        correction = _corrected(self._moved(goals, unknown), self.dropped)
+    def poses_at(self, poses: Array, unknown: Sequence[int]) -> Array | None:
+        """Its poses, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
+        correction = _corrected(self._moved(poses, unknown), self.dropped)
         return correction.poses if correction.ok and self.stands_at(correction.poses) else None
 
-    def _moved(self, goals: Array, unknown: Sequence[int]) -> Observation:
+    def _moved(self, poses: Array, unknown: Sequence[int]) -> Observation:
         there = np.array(self.observation.poses)
-        there[list(unknown)] = goals[list(unknown)]
+        there[list(unknown)] = poses[list(unknown)]
         return replace(self.observation, poses=there)
 
-    def stands_at(self, goals: Array) -> bool:
-        """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
+    def stands_at(self, poses: Array) -> bool:
+        """Whether the faces of every contact that is assumed look at each other at the poses, (n, 4, 4)."""
         observation = self.observation
-        away = faces_away(observation.assembly, observation.start, goals)
+        away = faces_away(observation.assembly, observation.start, poses)
         return not (away & observation.assembly.without(self.dropped)).any()
 
     def _faces_oppose(self) -> bool:
@@ -184,13 +184,13 @@ class SolvedHypothesis:
         return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
-def unbelieved(states: States) -> tuple[int, ...]:
-    """Operations of which no view is believed."""
+def untrusted(states: States) -> tuple[int, ...]:
+    """Operations of which no view is assumed."""
     return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
 def prior_surprise(case: Case, states: States, dropped: tuple[str, ...]) -> float:
-    """-2 log of how likely states are, and the views in them, whatever contacts say; beside all as stated."""
+    """-2 log of how likely states are, and the views in them, without contacts; relative to all as stated."""
     each = sum(case.merged(k, state).surprise for k, state in enumerate(states))
     return each + together(states, case.model) + len(dropped) * case.model.relation_surprise
 
@@ -209,55 +209,55 @@ def softened(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArra
 
 
 def hypothesis(
-    case: Case, states: States, dropped: tuple[str, ...] = (), believed: Observation | None = None
+    case: Case, states: States, dropped: tuple[str, ...] = (), assumed: Observation | None = None
 ) -> SolvedHypothesis:
-    """Solve for the goals that are most likely with these states, and without these relations.
+    """Solve for the poses that are most likely with these states, and without these relations.
 
     Args:
-        believed: The `believed_observation` of the states, if it is at hand.
+        assumed: The `assumed_observation` of the states, if it is at hand.
     """
-    if believed is None:
-        believed = believed_observation(case, states)
+    if assumed is None:
+        assumed = assumed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
-    correction = as_stated(believed) if trusted else _corrected(believed, dropped)
-    return SolvedHypothesis(case, states, dropped, believed, tested(believed, correction, unbelieved(states)))
+    correction = as_stated(assumed) if trusted else _corrected(assumed, dropped)
+    return SolvedHypothesis(case, states, dropped, assumed, tested(assumed, correction, untrusted(states)))
 
 
-def tested(believed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
-    """With the test of what was seen alone: directions that only left-out operations could tell of are not tested.
+def tested(assumed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
+    """With the test of what was observed alone: directions that only left-out operations could tell of are not tested.
 
     What is inferred agrees with its contacts, so these operations add nothing to the squared length, and the rank of
     their own columns is no degree of freedom.
     """
     if not left_out or correction.test is None or not correction.ok:
         return correction
-    kept = believed.assembly.without(correction.dropped)
-    system = seen_system(believed).among(kept)
+    kept = assumed.assembly.without(correction.dropped)
+    system = seen_system(assumed).among(kept)
     n = len(correction.poses)
     own = linearised_by(system, correction.poses, np.tile(np.eye(6), (n, 1, 1)))[1]
     own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
     freedom = max(0, correction.test.freedom - jacobian_rank(own))
     p = p_value(correction.test.chi_square, freedom)
-    if believed.tails is not None and freedom:
-        L = noise_factor(believed)
-        xi = pose.log(pose.inverse(believed.poses) @ correction.poses)
+    if assumed.tails is not None and freedom:
+        L = noise_factor(assumed)
+        xi = pose.log(pose.inverse(assumed.poses) @ correction.poses)
         _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
-        play = problem_of((believed,)).play_covariance(kept)
-        drawn = drawn_chi_squares(believed, L, Jt, play, left_out)
+        play = problem_of((assumed,)).play_covariance(kept)
+        drawn = drawn_chi_squares(assumed, L, Jt, play, left_out)
         p = drawn_p_value(drawn, correction.test.chi_square)
     return replace(correction, test=replace(correction.test, freedom=freedom, p_value=p))
 
 
 def as_stated(observation: Observation) -> Correction:
-    """The correction if every observation is believed as it is stated."""
+    """The correction if every observation is assumed as it is stated."""
     far = (observation.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any()
     return contact_apply(observation) if far else as_begun(observation)
 
 
-def believed_observation(case: Case, states: States) -> Observation:
-    """Views merged, and what is not believed inferred; shared errors and tails of several views are not kept."""
+def assumed_observation(case: Case, states: States) -> Observation:
+    """Views merged, and what is not assumed inferred; shared errors and tails of several views are not kept."""
     first = case.observation
-    goals = np.array(first.poses)
+    poses = np.array(first.poses)
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, state in enumerate(states):
@@ -266,15 +266,15 @@ def believed_observation(case: Case, states: States) -> Observation:
             unknown.append(k)
             covariance[k] = UNKNOWN
         else:
-            goals[k] = every.goal
+            poses[k] = every.goal
             covariance[k] = every.covariance
-    believed = replace(first, poses=goals, covariance=covariance, observed=np.ones(len(states), dtype=np.bool_))
+    assumed = replace(first, poses=poses, covariance=covariance, observed=np.ones(len(states), dtype=np.bool_))
     if any(len(views) > 1 for views in case.views):
-        believed = replace(believed, shared=(), tails=None)
+        assumed = replace(assumed, shared=(), tails=None)
     displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))
     if displaced:
-        believed = _displaced(believed, displaced)
-    return replace(believed, poses=inferred_goals(believed, unknown).goals) if unknown else believed
+        assumed = _displaced(assumed, displaced)
+    return replace(assumed, poses=infer_poses(assumed, unknown).poses) if unknown else assumed
 
 
 def _displaced(observation: Observation, operations: tuple[int, ...]) -> Observation:
@@ -293,5 +293,5 @@ def soft_deviation(observation: Observation) -> Array:
 
 
 def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
-    """Without other starts: what is not believed is where contacts say already."""
+    """Without other starts: what is not assumed is where contacts say already."""
     return as_begun.leaving_out(observation, dropped) if dropped else as_begun(observation)

@@ -13,16 +13,16 @@ from apo_bench.assembly import Hypothesis
 from apo_bench.geometry import Array, pose, right_jacobian
 
 _APART = 22.5
-"""Squared difference of two goals, in standard deviations of both, beyond which hypotheses are different modes: with
+"""Squared difference of two poses, in standard deviations of both, beyond which hypotheses are different modes: with
 six degrees of freedom one in a thousand is larger."""
 _FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
-"""(6, 6): goals are not told apart by less, [m, rad]."""
+"""(6, 6): poses are not distinguished by less, [m, rad]."""
 
 
 def mode_covariance(hypotheses: Sequence[Hypothesis]) -> Array | None:
-    """The covariance of the first hypothesis and of those of its mode about its goals, (n, 6, 6), [m, rad].
+    """The covariance of the first hypothesis and of those of its mode about its poses, (n, 6, 6), [m, rad].
 
-    The second moment of a mixture: of each hypothesis its covariance and the square of how far its goals are off, by
+    The second moment of a mixture: of each hypothesis its covariance and the square of how far its poses are off, by
     their weights.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Hypotheses that differ from one by what is believed of an operation, of two that are exchanged, of some in a row."""
+"""Hypotheses that differ from one by what is assumed of an operation, of two that are exchanged, of some in a row."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -32,7 +32,7 @@ _MOST_READINGS = 3
 _UNLIKELY = 30.0
 """A reading that is less likely than the likeliest by so much in -2 log is not solved."""
 _FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
-"""(6, 6): goals that contacts fix are known to no less than this, [m, rad]."""
+"""(6, 6): poses that contacts fix are known to no less than this, [m, rad]."""
 _WIDER = 2
 """Operations by which a row of displaced ones is made longer at either end."""
 
@@ -44,10 +44,10 @@ def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States
 
 
 def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting) -> list[int]:
-    """What may be believed of a view of operation k, the likeliest first, given the goals that are inferred without it.
+    """What may be assumed of a view of operation k, the likeliest first, given the poses that are inferred without it.
 
-    Near these goals everything is Gaussian: a reading is as likely as it is near to the inferred goal, in standard
-    deviations of both. Of what contacts leave free the inferred goal knows nothing.
+    Near these poses everything is Gaussian: a reading is as likely as it is near to the inferred pose, in standard
+    deviations of both. Of what contacts leave free the inferred pose knows nothing.
     """
     rest = [belief for belief in alternatives(view) if belief not in (BROAD, GROSS)]
     C = without.correction.covariance
@@ -69,7 +69,7 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
 
 
 def _widened(C: Array) -> Array:
-    """The covariance of an inferred goal if nothing but contacts tells of it: `UNKNOWN` is anywhere in the room."""
+    """The covariance of an inferred pose if nothing but contacts tells of it: `UNKNOWN` is anywhere in the room."""
     W = np.linalg.inv(C) - np.linalg.inv(UNKNOWN) + np.linalg.inv(ROOM)
     w, V = np.linalg.eigh((W + W.T) / 2)
     return np.asarray((V / np.maximum(w, 1.0)) @ V.T)
@@ -86,7 +86,7 @@ def swaps(case: Case, states: States) -> Iterator[States]:
 
 
 def continued(views: Sightings, states: States, model: OutlierModel) -> States:
-    """States of what was seen before, with the likeliest of what was seen since: right, anywhere, or false again."""
+    """States of the earlier views, with the likeliest of the later ones: right, anywhere, or false again."""
     grown = list[State]()
     for own, state in zip(views, states, strict=True):
         now = state
@@ -99,7 +99,7 @@ def continued(views: Sightings, states: States, model: OutlierModel) -> States:
 
 
 def displaced_together(states: States) -> Iterator[States]:
-    """With operations in a row displaced together: those in doubt, and some beside them."""
+    """With operations in a row displaced together: those in doubt, and some of their neighbours."""
     alone = [len(state) == 1 for state in states]
     doubted = [k for k, state in enumerate(states) if alone[k] and is_false(state[0])]
     if not doubted:

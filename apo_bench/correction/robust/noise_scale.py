@@ -1,6 +1,6 @@
 """Noise that is larger than stated: by how much is part of the estimate, as far as contacts are redundant.
 
-If all errors are s times as large, a correction is s times as long, and its goals are the same. So the squared length
+If all errors are s times as large, a correction is s times as long, and its poses are the same. So the squared length
 and its degrees of freedom tell s, and nothing is solved again. What is not known of s before is that its logarithm is
 normal.
 """
@@ -19,7 +19,7 @@ SCALED = 0.1
 LEAST = 1.15
 """Noise that is less than so many times as large is taken as it is stated."""
 _SAID = 1.5
-"""What is less than so many times as large happens by chance, and nothing is said of it."""
+"""What is less than so many times as large happens by chance, and nothing is stated of it."""
 _LARGEST = 10.0
 _STEPS = 30
 
@@ -52,7 +52,7 @@ def region_scale(scale: float, freedom: int) -> float:
 
 
 def scaled_test(test: Consistency, scale: float) -> Consistency:
-    """The test beside noise that is so much larger; that this was estimated costs a degree of freedom."""
+    """The test with noise that is so much larger; to estimate the scale costs a degree of freedom."""
     chi_square = test.chi_square / scale**2
     freedom = max(test.freedom - 1, 0)
     return replace(test, chi_square=chi_square, freedom=freedom, p_value=p_value(chi_square, freedom))

@@ -21,7 +21,7 @@ from apo_bench.assembly import (
 from apo_bench.correction.checks.chi_square import TEST_LEVEL
 from apo_bench.correction.checks.status import refused_correction
 from apo_bench.correction.contact.contact import contact_apply
-from apo_bench.correction.contact.inferred import inferred_goals
+from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
@@ -36,22 +36,22 @@ TEMPERATURE = 3.0
 UNNAMED = 0.02
 """How often none of the hypotheses is right there: what the weights of all leave to 1."""
 _LITTLE = 0.005
-"""A relation that is to blame with less is not spoken of beside an observation that is."""
+"""A relation that is to blame with less is not mentioned."""
 _SURE = 0.01
 """An operation is looked at again if it is likelier than this that another state is the right one, ..."""
 _SURE_DEVIATION = np.repeat([5e-3, np.radians(5.0)], 3)
-"""... or where its goal is less certain than this, [m, rad]."""
+"""... or where its pose is less certain than this, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True)
 class RobustCorrector:
-    """Nearest consistent goals, with observations left out that the others contradict."""
+    """Nearest consistent poses, with observations left out that the others contradict."""
 
     outliers: OutlierModel | None = None
     """None stands for what the observation states, or for what is usual."""
     level: float = TEST_LEVEL
-    """A set of observations is believed if the p-value of its correction is not below."""
+    """A set of observations is assumed if the p-value of its correction is not below."""
     temperature: float = TEMPERATURE
     """Weights of hypotheses are likelihoods to the power of its inverse."""
 
@@ -59,8 +59,8 @@ class RobustCorrector:
         """Correct an observation.
 
         Returns:
-            As `contact`; `left_out` are operations of which nothing that was seen is believed, their goals are
-            inferred from contacts. `not_seen` if one was not seen of which no contact says anything.
+            As `contact`; `left_out` are operations of which nothing that was observed is assumed, their poses are
+            inferred from contacts. `not_seen` if one was not observed of which no contact says anything.
 
         Raises:
             InputError: The covariance of an operation is not positive definite.
@@ -89,7 +89,7 @@ class RobustCorrector:
         best = None
         while True:
             search = Search(Case(observation, views, model), self.level, self.temperature)
-            baseless = inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
+            baseless = infer_poses(observation, [k for k, own in enumerate(views) if not own]).baseless
             best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
@@ -122,7 +122,7 @@ class RobustCorrector:
             correction,
             sentence=correction.sentence + scale_words(scale),
             covariance=None if C is None else C * region_scale(scale, test.freedom) ** 2,
-            believed=noisier(observation, region_scale(scale, test.freedom)),
+            assumed=noisier(observation, region_scale(scale, test.freedom)),
             noise_scale=scale,
         )
 
@@ -131,7 +131,7 @@ contact_robust = RobustCorrector()
 
 
 def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
-    """Operations that are worth another look: of which nothing is believed as it was stated, or not surely."""
+    """Operations that are worth another look: of which nothing is assumed as it was stated, or not surely."""
     if best is None:
         return tuple(range(search.operations))
     doubted = []
@@ -144,15 +144,15 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
 
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
-    """A hypothesis whose operations of which little was seen lead to where there is room for their parts."""
+    """A hypothesis whose operations of which little was observed lead to where there is room for their parts."""
     shifted = tuple(k for k, state in enumerate(hypothesis.states) if state == (SHIFTED,))
     unknown = tuple(sorted({*hypothesis.left_out, *shifted}))
     covariance = hypothesis.correction.covariance
     if not unknown or covariance is None or not np.isfinite(hypothesis.badness):
         return hypothesis
 
-    def solve(goals: Array) -> Array | None:
-        return hypothesis.goals_at(goals, unknown)
+    def solve(poses: Array) -> Array | None:
+        return hypothesis.poses_at(poses, unknown)
 
     better = least_crowded(hypothesis.observation, hypothesis.correction.poses, covariance, unknown, solve)
     return hypothesis if better is None else hypothesis.at(better, unknown)
@@ -161,7 +161,7 @@ def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
 def _report(
     observation: Observation, first: SolvedHypothesis, search: Search, best: SolvedHypothesis, again: list[int]
 ) -> Correction:
-    """The correction of what is believed, with what was seen at first."""
+    """The correction of what is assumed, with what was observed at first."""
     correction = best.correction
     if not best.doubts and not again:
         return replace(correction, sentence=correction.sentence + _unexplained(best))
@@ -176,17 +176,17 @@ def _report(
         test=first.correction.test or correction.test,
         test_after=best.test,
         left_out=best.left_out,
-        believed=best.stated,
+        assumed=best.stated,
         hypotheses=hypotheses,
     )
 
 
 def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...]:
-    """All that were kept; the likeliest with its parts where there is room for them, as the goals that are returned."""
+    """All that were kept; the likeliest with its parts where there is room for them, as the poses that are returned."""
     weights = dict[tuple[States, tuple[str, ...]], float]()
     solved_by = {(best.states, best.dropped): best}
     for weight, solved in search.weighted():
-        # Noise that is larger than stated leaves the goals, so it is no other hypothesis.
+        # Noise that is larger than stated leaves the poses, so it is no other hypothesis.
         what = solved.states, solved.dropped
         weights[what] = weights.get(what, 0.0) + weight
         solved_by.setdefault(what, solved.noisier())
@@ -217,7 +217,7 @@ def _unexplained(best: SolvedHypothesis) -> str:
 
 
 def _doubts(search: Search, best: SolvedHypothesis) -> str:
-    """What is not believed, and how likely it is that a relation is wrong in place of an observation."""
+    """What is not assumed, and how likely it is that a relation is wrong in place of an observation."""
     words = _disbelieved(best)
     rival = search.rival(best)
     if rival is None:
@@ -230,7 +230,7 @@ def _doubts(search: Search, best: SolvedHypothesis) -> str:
 
 
 def _disbelieved(best: SolvedHypothesis) -> str:
-    """`; left out what was seen of operation 2; seen turned: operation 3`, or empty."""
+    """`; left out what was observed of operation 2; seen turned: operation 3`, or empty."""
     states = best.states
     stale = tuple(k for k in best.left_out if STALE in states[k])
     lists = (
@@ -248,7 +248,7 @@ def _disbelieved(best: SolvedHypothesis) -> str:
 
 
 def _those(best: SolvedHypothesis, which: Callable[[int], bool]) -> tuple[int, ...]:
-    """Operations with a view that is believed so, and that are not left out."""
+    """Operations with a view that is assumed so, and that are not left out."""
     return tuple(k for k, state in enumerate(best.states) if any(map(which, state)) and k not in best.left_out)
 
 

@@ -2,8 +2,8 @@
 
 While the test of `contact` holds, nothing is doubted. If it fails, the smallest sets of operations are looked for
 without which the rest agrees: a set is solved only if the contacts that none of it has a part in agree with each other
-at what was seen, which is quick to say for every set. Of the sets whose test holds the likeliest is taken. Then each of
-its states is changed for as long as that is likelier, and each relation that it has a part in may be wrong instead.
+at what was observed, which is quick to check for every set. Of the sets whose test holds the likeliest is taken. Then
+each of its states is changed while that is likelier, and each relation that it has a part in may be wrong instead.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State,
 from apo_bench.correction.robust.hypotheses import (
     Case,
     SolvedHypothesis,
-    believed_observation,
+    assumed_observation,
     hypothesis,
 )
 from apo_bench.correction.robust.nearby import (
@@ -56,7 +56,7 @@ _HOPELESS = 150.0
 742 hypotheses, of outliers in ten scenes, that were within 60 when they were solved the farthest was at 118 by that."""
 _MOST_KEPT = 16
 _LEAST_KEPT = 1e-3
-"""Hypotheses that are told of at most, and how likely one is at least beside the likeliest."""
+"""Hypotheses that are reported at most, and how likely one is at least relative to the likeliest."""
 
 
 @final
@@ -101,7 +101,7 @@ class Search:
         return min(self._known(), key=_badness, default=None)
 
     def _rescaled(self) -> None:
-        """What if noise is larger than stated: all that was seen believed, or what is likeliest."""
+        """What if noise is larger than stated: all that was observed assumed, or what is likeliest."""
         for one in (self.first, min(self._known(), key=_badness, default=None)):
             if one is not None and (noisier := one.noisier()).scale > one.scale:
                 self._solved[noisier.key] = noisier
@@ -122,7 +122,7 @@ class Search:
         return float(weights @ [which(other) for other in known] / weights.sum())
 
     def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
-        """What was solved with how likely it is beside the rest, the likeliest first; the unlikely ones left out."""
+        """What was solved with its weight, the likeliest first; the unlikely ones left out."""
         known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
         if not known:
             return []
@@ -132,18 +132,18 @@ class Search:
         return [(float(weight / whole), solved) for weight, solved in kept]
 
     def _weights(self, some: list[SolvedHypothesis], best: SolvedHypothesis) -> Array:
-        """How likely some are beside the best: their likelihood by the temperature."""
+        """How likely some are relative to the best: their likelihood by the temperature."""
         return np.exp([-0.5 / self._temperature * (one.badness - best.badness) for one in some])
 
     def _known(self) -> list[SolvedHypothesis]:
         return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
     def _try(
-        self, states: States, dropped: tuple[str, ...] = (), believed: Observation | None = None
+        self, states: States, dropped: tuple[str, ...] = (), assumed: Observation | None = None
     ) -> SolvedHypothesis:
         key = states, dropped, False
         if key not in self._solved:
-            self._solved[key] = hypothesis(self._case, states, dropped, believed)
+            self._solved[key] = hypothesis(self._case, states, dropped, assumed)
         return self._solved[key]
 
     def _looked_at(self) -> int:
@@ -151,19 +151,19 @@ class Search:
         return len(self._solved.keys() | self._expected.keys())
 
     def _solve(self, some: Iterable[tuple[States, tuple[str, ...]]], least: float = np.inf) -> list[SolvedHypothesis]:
-        """Those of some hypotheses, solved, that are not hopeless beside this -2 log, or the likeliest of them."""
+        """Those of some hypotheses, solved, that are not hopeless compared with this -2 log."""
         some = list(some)
-        believed = dict[States, Observation]()
+        assumed = dict[States, Observation]()
         for states, dropped in some:
             key = states, dropped, False
             if key not in self._solved and key not in self._expected:
-                if states not in believed:
-                    believed[states] = believed_observation(self._case, states)
-                self._expected[key] = expected_badness(self._case, states, dropped, believed[states])
+                if states not in assumed:
+                    assumed[states] = assumed_observation(self._case, states)
+                self._expected[key] = expected_badness(self._case, states, dropped, assumed[states])
         for states, dropped in sorted(some, key=lambda one: self._expected.get((*one, False), -np.inf)):
             key = states, dropped, False
             if key in self._solved or self._expected[key] <= least + _HOPELESS:
-                least = min(least, self._try(states, dropped, believed.get(states)).badness)
+                least = min(least, self._try(states, dropped, assumed.get(states)).badness)
         return [
             self._solved[states, dropped, False] for states, dropped in some if (states, dropped, False) in self._solved
         ]
@@ -225,7 +225,7 @@ class Search:
         return max(1, round((least - known[now]) / _BY))
 
     def _believed(self, k: int) -> State:
-        """The likeliest state of an operation in which a view is believed."""
+        """The likeliest state of an operation in which a view is assumed."""
         return next(state for _, state in self._beliefs[k] if INLIER in state)
 
     def _refined(self, best: SolvedHypothesis) -> None:
@@ -244,7 +244,7 @@ class Search:
         states = best.states
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
             for i, now in enumerate(state):
-                # Of several views of an operation that is in doubt the one that is believed may be the false one.
+                # Of several views of an operation that is in doubt the one that is assumed may be the false one.
                 if now == DISPLACED or set(state) == {INLIER}:
                     continue
                 blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))

@@ -1,6 +1,6 @@
-"""What was seen of each operation, once or several times, and what comes of it if some of that is not believed.
+"""What was observed of each operation, once or several times, and what comes of it if some of that is not assumed.
 
-Views of one operation that are believed are merged into one Gaussian. That they agree is evidence that they are right,
+Views of one operation that are assumed are merged into one Gaussian. That they agree is evidence that they are right,
 since false views lie anywhere, but for those that repeat the first.
 """
 
@@ -27,7 +27,7 @@ from apo_bench.correction.robust.beliefs import (
 from apo_bench.geometry import Array, approximate_symmetries, pose
 
 _MOST_TOGETHER = 3
-"""Of more views than this only those that agree are believed together."""
+"""Of more views than this only those that agree are assumed together."""
 _AGREE = 50.0
 """Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
 _IMPOSSIBLE = 60.0
@@ -41,10 +41,10 @@ class Merged(NamedTuple):
     """What the views of an operation say together if they are in some state."""
 
     goal: Array | None
-    """(4, 4); None if none of them is believed."""
+    """(4, 4); None if none of them is assumed."""
     covariance: Array
     surprise: float
-    """-2 log of how likely such states and views are, beside one inlier, whatever contacts say."""
+    """-2 log of how likely such states and views are, relative to one inlier, without contacts."""
 
 
 Sightings = tuple[tuple[Sighting, ...], ...]
@@ -52,14 +52,14 @@ Sightings = tuple[tuple[Sighting, ...], ...]
 
 
 def views_of(observation: Observation, model: OutlierModel | None = None) -> Sightings:
-    """What was seen, once at most."""
+    """What was observed, once at most."""
     return looked_again(((),) * len(observation.poses), observation, observation, model)
 
 
 def looked_again(
     views: Sightings, observation: Observation, first: Observation, model: OutlierModel | None = None
 ) -> Sightings:
-    """With what was seen this time; `first` is the first look, which says where parts were before."""
+    """With what was observed this time; `first` is the first look, which says where parts were before."""
     assembly = observation.assembly
     mains = [operation.main for operation in assembly.operations]
     before = _before(first)
@@ -82,7 +82,7 @@ def looked_again(
 
 
 def _before(first: Observation) -> list[tuple[Array, Array] | None]:
-    """Where the part of each operation was before it, and the covariance of that; None if an operation was not seen."""
+    """Where the part of each operation was before it, and the covariance of that; None if that is not known."""
     now: dict[str, Array | None] = dict.fromkeys(first.start, _EXACT)
     found = list[tuple[Array, Array] | None]()
     where = (first.start, *placements(first.assembly, first.start, first.poses)) if first.start else ()
@@ -99,16 +99,16 @@ def merged(views: Sequence[Sighting], state: State, model: OutlierModel, exchang
     pairs = [
         (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
     ]
-    believed = [reading(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
+    assumed = [reading(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
     unlikely = surprise(views, state, model)
     anywhere = log_volume(ROOM)
-    if not believed:
+    if not assumed:
         return Merged(None, ROOM, unlikely + anywhere * max(0, len(views) - 1))
-    unlikely += anywhere * (len(views) - len(believed))
-    if len(believed) == 1:
-        return Merged(*believed[0], unlikely)
-    goal, covariance, length = _mean(believed)
-    apart = sum(log_volume(C) for _, C in believed) - log_volume(covariance)
+    unlikely += anywhere * (len(views) - len(assumed))
+    if len(assumed) == 1:
+        return Merged(*assumed[0], unlikely)
+    goal, covariance, length = _mean(assumed)
+    apart = sum(log_volume(C) for _, C in assumed) - log_volume(covariance)
     return Merged(goal, covariance, unlikely + length + apart)
 
 
@@ -128,7 +128,7 @@ def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float,
 
     The likeliest is first; those that are out of the question are left out.
 
-    Of equally likely ones that which believes the latest view: an earlier one was looked at again for a reason.
+    Of equally likely ones that which assumes the latest view: an earlier one was looked at again for a reason.
     """
     m = len(views)
     groups: set[tuple[int, ...]] = {()}
@@ -161,11 +161,11 @@ def _agree(a: Sighting, b: Sighting) -> bool:
 
 def _mean(views: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, float]:
     """The most likely pose, its covariance, and the squared length of all deviations from it."""
-    goals = np.array([goal for goal, _ in views])
+    poses = np.array([goal for goal, _ in views])
     W = np.linalg.inv([C for _, C in views])
     C = np.linalg.inv(W.sum(axis=0))
-    T = goals[-1]
+    T = poses[-1]
     for _ in range(_ITERATIONS):
-        T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ goals)))
-    xi = pose.log(pose.inverse(T) @ goals)
+        T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ poses)))
+    xi = pose.log(pose.inverse(T) @ poses)
     return T, (C + C.T) / 2, float(np.einsum("ki,kij,kj->", xi, W, xi))

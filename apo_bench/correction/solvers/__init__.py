@@ -1,7 +1,7 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearised_by
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestGoals, batch_goals, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestPoses, nearest_poses, solve_batch
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,
@@ -46,12 +46,11 @@ __all__ = (
     "Freedom",
     "Inequalities",
     "Kernels",
-    "NearestGoals",
+    "NearestPoses",
     "ProjectedContacts",
     "Solution",
     "Whitened",
     "active_rank",
-    "batch_goals",
     "bounded",
     "compact_equations",
     "coordinates_of",
@@ -65,13 +64,14 @@ __all__ = (
     "linearised_by",
     "marginals",
     "nearest_between",
-    "nearest_goals",
+    "nearest_poses",
     "noise_factor",
     "plays",
     "project_vertices",
     "projections",
     "scales",
     "settled_basis",
+    "solve_batch",
     "solve_newton",
     "twists_of",
     "violations",

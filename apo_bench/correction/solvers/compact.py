@@ -59,16 +59,16 @@ class CompactEquations:
         return CompactEquations(self.words.among(contacts), self.constants, self.plane[contacts], points)
 
     def forms(self, T: Array) -> Array:
-        """n D_a^-1 D_b of each contact, (*, c, 4), at the goals T, (*, n, 4, 4): e of any vertex is this times it."""
+        """n D_a^-1 D_b of each contact, (*, c, 4), at the poses T, (*, n, 4, 4): e of any vertex is this times it."""
         return np.asarray((self.plane[:, None] @ self.words.products(self.constants, T))[..., 0, :])
 
     def residual(self, T: Array) -> Array:
-        """e of every equation, (*, 3 c), at the goals T, (*, n, 4, 4), [m]."""
+        """e of every equation, (*, 3 c), at the poses T, (*, n, 4, 4), [m]."""
         e = self._behind(self.words.factors(self.constants, T))[..., 0, :, :, :] @ self.plane[:, :, None]
         return np.asarray(e.reshape(*e.shape[:-3], 3 * len(self)))
 
     def blocks(self, T: Array, B: Array) -> tuple[Array, Array]:
-        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's goal, (*, c, w, 6, 3).
+        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's pose, (*, c, w, 6, 3).
 
         It is df/dq of Eq. 10, by the derivatives of the paper's appendix, which hold at dq = 0.
 
@@ -76,7 +76,7 @@ class CompactEquations:
         changes e by f G p; T^-1 stays on the side of p, with the opposite sign. A T that occurs twice adds up.
 
         Args:
-            B: (*, n, 6, 6), the body twist of each goal per unit of its coordinates.
+            B: (*, n, 6, 6), the body twist of each pose per unit of its coordinates.
         """
         F = self.words.factors(self.constants, T)
         lead = F.shape[:-4]
@@ -91,7 +91,7 @@ class CompactEquations:
         # f G_i of the generators G_i = d(dT)/dq_i (appendix), and p, on the side of each letter where its change acts.
         fG = forms.reshape(*lead, (w + 1) * c, 4).take(self.words.sides, axis=-2) @ _GENERATORS
         p = behind.reshape(*lead, (w + 1) * c, 3, 4).take(self.words.sides, axis=-3)
-        # B^t of each letter's goal, with its sign: what twists make of coordinates z.
+        # B^t of each letter's pose, with its sign: what twists make of coordinates z.
         signed = np.zeros((*B.shape[:-3], 2, self.n + 1, 6, 6))
         signed[..., 0, : self.n, :, :] = np.swapaxes(B, -1, -2)
         np.negative(signed[..., 0, :, :, :], out=signed[..., 1, :, :, :])
@@ -132,15 +132,15 @@ def compact_equations(system: Equations, n: int) -> CompactEquations:
 
 
 def linearised_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, Array]:
-    """e, (*, 3 c), [m], at the goals T, (*, n, 4, 4), and its derivative by z, transposed, (*, 6 n, 3 c).
+    """e, (*, 3 c), [m], at the poses T, (*, n, 4, 4), and its derivative by z, transposed, (*, 6 n, 3 c).
 
     Args:
-        B: (*, n, 6, 6) or (*, n, 6, 6 n): what a change of z makes of the body twist of each goal.
+        B: (*, n, 6, 6) or (*, n, 6, 6 n): what a change of z makes of the body twist of each pose.
     """
     if B.shape[-1] == 6:
         e, blocks = system.blocks(T, B)
         return e, system.gathered(blocks)
-    # Every goal depends on every number of z: J by all body twists, times what z makes of them.
+    # Every pose depends on every number of z: J by all body twists, times what z makes of them.
     size = B.shape[-1]
     e, blocks = system.blocks(T, np.broadcast_to(np.eye(6), (*T.shape[:-2], 6, 6)))
     return e, np.asarray(np.swapaxes(B.reshape(*T.shape[:-3], size, size), -1, -2) @ system.gathered(blocks))

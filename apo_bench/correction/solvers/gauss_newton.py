@@ -40,16 +40,16 @@ FALL = 0.3
 SQUARED_GAP_FLOOR = 1e-14
 """mu is at least this part of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
-"""[rad]. No goal is rotated further in one step."""
+"""[rad]. No pose is rotated further in one step."""
 LARGEST_DENSE = 72
 """Unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
 
 
-class NearestGoals(NamedTuple):
+class NearestPoses(NamedTuple):
     """The result of the solver: of each observation of a batch, (b, ..), or of one."""
 
-    goals: Array
+    poses: Array
     """(*, n, 4, 4); the seen ones, if a number was not finite on the way."""
     z: Array
     """(*, 6 n): the correction in standard deviations."""
@@ -58,7 +58,7 @@ class NearestGoals(NamedTuple):
     Jt: Any
     """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]; of many operations, a sparse matrix of SciPy."""
     B: Array
-    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected goal k: J_r(xi) L, [m, rad]; where
+    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected pose k: J_r(xi) L, [m, rad]; where
     operations share errors (n, 6, 6 n), of all of z."""
     at_rest: NDArray[np.bool_]
     """(*,)."""
@@ -70,43 +70,43 @@ class NearestGoals(NamedTuple):
     """The iterations, of a batch those of each observation: the largest |e| of the compact equations before it, [m],
     and the largest component of its step, in standard deviations."""
 
-    def at(self, i: int) -> NearestGoals:
+    def at(self, i: int) -> NearestPoses:
         """Those of one observation of a batch."""
-        return NearestGoals(*[x[i] for x in self])
+        return NearestPoses(*[x[i] for x in self])
 
-    def batch(self) -> NearestGoals:
+    def batch(self) -> NearestPoses:
         """Those of one observation as a batch."""
         fields: list[Any] = [[x] if hasattr(x, "nnz") else np.asarray(x)[None] for x in self[:-1]]
         fields.append([self.trace])
-        return NearestGoals(*fields)
+        return NearestPoses(*fields)
 
 
-def nearest_goals(
+def nearest_poses(
     system: CompactEquations,
-    goals: Array,
+    poses: Array,
     L: Array,
     soft_m: Array | None = None,
     begin: Array | None = None,
     kernels: Kernels | None = None,
-) -> NearestGoals:
-    """Change all goals as little as the contacts ask for.
+) -> NearestPoses:
+    """Change all poses as little as the contacts ask for.
 
     Args:
-        goals: (n, 4, 4), or (b, n, 4, 4), what was seen, world frame, [m].
+        poses: (n, 4, 4), or (b, n, 4, 4), what was observed, world frame, [m].
         L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad]; or (*, n, 6, 6 n), of all of them together.
         soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
         begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
         kernels: What is used in place of NumPy.
     """
-    if goals.ndim == 4:
-        L = np.broadcast_to(L, (len(goals), *L.shape[-3:]))
-        return batch_goals(system, goals, L, soft_m, begin, kernels, sparse=False)
+    if poses.ndim == 4:
+        L = np.broadcast_to(L, (len(poses), *L.shape[-3:]))
+        return solve_batch(system, poses, L, soft_m, begin, kernels, sparse=False)
     z = None if begin is None else begin[None]
-    return batch_goals(system, goals[None], L[None], soft_m, z, kernels).at(0)
+    return solve_batch(system, poses[None], L[None], soft_m, z, kernels).at(0)
 
 
-def batch_goals(
+def solve_batch(
     system: CompactEquations,
     observed: Array,
     L: Array,
@@ -114,8 +114,8 @@ def batch_goals(
     begin: Array | None = None,
     kernels: Kernels | None = None,
     sparse: bool | None = None,
-) -> NearestGoals:
-    """`nearest_goals` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
+) -> NearestPoses:
+    """`nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
 
     Args:
         sparse: Whether matrices are sparse, of a batch of one without shared errors; None leaves that to its size.
@@ -133,7 +133,7 @@ def batch_goals(
     return _nearest(step, z)
 
 
-def _nearest(step: LinearStep, z: Array) -> NearestGoals:
+def _nearest(step: LinearStep, z: Array) -> NearestPoses:
     """The loop. Observations that rest are left alone while the others, those of number `going`, go on.
 
     Args:
@@ -161,7 +161,7 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
         most = min(1.0, FALL**iteration)
         mu = np.array([damping(row_size[o], gap2[o], most) for o in going])
         change, largest, angles = step.change(z, mu, rows)
-        # Rest where the next step would be too short to matter. A step that turns a goal far is shortened, since
+        # Rest where the next step would be too short to matter. A step that turns a pose far is shortened, since
         # contacts are linear for small turns only.
         left = []
         for i, (o, size, angle) in enumerate(zip(going, largest.tolist(), angles.tolist(), strict=True)):
@@ -181,7 +181,7 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
     if not finite.all():
         z[~finite] = 0.0
         step.leave_alone(~finite)
-    return NearestGoals(step.T, z, step.e, step.Jt, step.B, at_rest, finite, step.forms, traces)
+    return NearestPoses(step.T, z, step.e, step.Jt, step.B, at_rest, finite, step.forms, traces)
 
 
 def damping(row_size: float, gap2: float, most: float) -> float:
@@ -211,6 +211,6 @@ def settles(size: float, before: float, sure: float = SURE, following: float = N
 
 
 def shortened_step(step: Array, L: Array) -> Array:
-    """A step (6 n,), shortened if a goal would turn further than `LARGEST_TURN`."""
+    """A step (6 n,), shortened if a pose would turn further than `LARGEST_TURN`."""
     (angle,) = turn_of(step[None], L[None]).tolist()
     return step * (LARGEST_TURN / angle) if angle > LARGEST_TURN else step

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Equations, project_round_faces
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
-from apo_bench.correction.solvers.linear_step import goals_at, shortest_z
+from apo_bench.correction.solvers.gauss_newton import FALL, NearestPoses, damping, settles, shortened_step
+from apo_bench.correction.solvers.linear_step import poses_at, shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.whitened import pulled
 from apo_bench.errors import require
@@ -59,19 +59,19 @@ class Inequalities:
         rows = contacts[self.system.contact]
         return Inequalities(self.system.among(contacts), self.low[rows], self.high[rows])
 
-    def overstepped(self, goals: Array) -> Array:
-        """By how much the worst vertex of each contact is beyond its bounds at the goals, [m]; 0 if none is."""
-        e = self.system.residual(goals)
+    def overstepped(self, poses: Array) -> Array:
+        """By how much the worst vertex of each contact is beyond its bounds at the poses, [m]; 0 if none is."""
+        e = self.system.residual(poses)
         worst = np.zeros(len(self.system.letters))
         np.maximum.at(worst, self.system.contact, np.maximum(self.low - e, e - self.high))
         return worst
 
 
-def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, goals: Array) -> Array:
+def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, poses: Array) -> Array:
     """The largest |e| of each contact that is an equation, (c,), [m]; or how far an inequality is violated."""
-    gaps = system.gaps(goals)
+    gaps = system.gaps(poses)
     if len(inequalities):
-        gaps[~exact] = inequalities.overstepped(goals)
+        gaps[~exact] = inequalities.overstepped(poses)
     return gaps
 
 
@@ -94,14 +94,14 @@ def bounded(system: Equations, exact: NDArray[np.bool_], low: Array, high: Array
 
 
 def nearest_between(
-    system: CompactEquations, inequalities: Inequalities, observed: Array, L: Array, start: NearestGoals
-) -> NearestGoals:
-    """The nearest goals that satisfy the equations and the inequalities.
+    system: CompactEquations, inequalities: Inequalities, observed: Array, L: Array, start: NearestPoses
+) -> NearestPoses:
+    """The nearest poses that satisfy the equations and the inequalities.
 
     Args:
-        observed: (n, 4, 4), what was seen, world frame, [m].
-        L: (n, 6, 6) or (n, 6, 6 n), as of `nearest_goals`.
-        start: The nearest goals without inequalities.
+        observed: (n, 4, 4), what was observed, world frame, [m].
+        L: (n, 6, 6) or (n, 6, 6 n), as of `nearest_poses`.
+        start: The nearest poses without inequalities.
 
     Returns:
         Not at rest if the inequalities leave no room.
@@ -119,7 +119,7 @@ def nearest_between(
     trace = list(start.trace)
     pace = 1.0
     z = start.z
-    T = start.goals
+    T = start.poses
     B = start.B
     rest = False
     Jt = start.Jt
@@ -143,11 +143,11 @@ def nearest_between(
         pace = _paced(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
-        (T,), (B,) = goals_at(observed, L[None], z[None])
+        (T,), (B,) = poses_at(observed, L[None], z[None])
         before = largest
         if over:
             break
-    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), system.forms(T), trace)
+    return NearestPoses(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), system.forms(T), trace)
 
 
 def _settled(e: Array, Jt: Array, z: Array) -> Array:
@@ -160,13 +160,13 @@ def _settled(e: Array, Jt: Array, z: Array) -> Array:
     return np.asarray(shortest_z(J, e[None], z[None], np.full((1, m), mu))[0])
 
 
-def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestGoals) -> int:
+def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) -> int:
     """How many directions the active inequalities fix beyond the equations.
 
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
     """
-    e, J = inequalities.system.linearised(nearest.goals)
+    e, J = inequalities.system.linearised(nearest.poses)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
     J = pulled(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0

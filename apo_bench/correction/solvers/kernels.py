@@ -71,16 +71,16 @@ def linearise(
     forms: _Array,
     sizes: _Array,
 ) -> None:
-    """Goals T = T_observed exp(L z), the equations e there and their derivative J by z (Eq. 10), of some observations.
+    """Poses T = T_observed exp(L z), the equations e there and their derivative J by z (Eq. 10), of some observations.
 
     Args:
         words: (3, c, w): letters, columns and inverse (0 or 1) of `Words`.
-        matrices: (2, p + n + 1, 4, 4): `Words.constants`, poses and their inverses; those of the goals are overwritten.
+        matrices: (2, p + n + 1, 4, 4): `Words.constants`, poses and their inverses; those of the poses are overwritten.
         points: (b, c, 3, 4); observed (b, n, 4, 4); L (b, n, 6, 6); z (b, 6 n).
         soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
         rows: Which observations.
         series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
-        small: (6, 6, 6), scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one goal.
+        small: (6, 6, 6), scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one pose.
         behind: (w + 1, 3, 4), scratch: what stands behind each letter of one contact times its points; so is before,
             (w + 1, 4), its plane times what stands before.
         T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), forms (b, c, 4),

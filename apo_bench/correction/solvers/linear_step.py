@@ -24,7 +24,7 @@ class LinearStep(Protocol):
     """The contact equations of b observations where they were linearised last."""
 
     T: Array
-    """(b, n, 4, 4): goals."""
+    """(b, n, 4, 4): poses."""
     B: Array
     """(b, n, 6, 6) or (b, n, 6, 6 n): what a change of z makes of the body twists at T."""
     e: Array
@@ -49,11 +49,11 @@ class LinearStep(Protocol):
         """The step from z, (b, 6 n), of some observations to J^t (J J^t + mu + soft^2)^-1 (J z - e).
 
         Returns:
-            The step (rows, 6 n), its largest component (rows,), and how far it turns a goal at most (rows,), [rad].
+            The step (rows, 6 n), its largest component (rows,), and how far it turns a pose at most (rows,), [rad].
         """
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
-        """Forget what was linearised of some observations, (b,): goals are those that were seen."""
+        """Forget what was linearised of some observations, (b,): poses are those that were observed."""
 
 
 @final
@@ -104,7 +104,7 @@ class DenseStep:
             self._kernels.linearise(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
             return
         some = self._views(rows)
-        self.T[some], self.B[some] = goals_at(self._observed[some], self._L[some], z[some])
+        self.T[some], self.B[some] = poses_at(self._observed[some], self._L[some], z[some])
         e, Jt = linearised_by(self._system.only(some), self.T[some], self.B[some])
         m = max(self.e.shape[1], 1)
         self.e[some] = e
@@ -151,8 +151,8 @@ def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
     return np.asarray((Jt @ np.linalg.solve(A, wanted))[..., 0])
 
 
-def goals_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
-    """Goals T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
+def poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+    """Poses T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
 
     Args:
         observed: (n, 4, 4) or (b, n, 4, 4); L is (b, n, 6, 6) or (b, n, 6, 6 n), and z (b, 6 n).
@@ -168,6 +168,6 @@ def twists(z: Array, L: Array) -> Array:
 
 
 def turn_of(step: Array, L: Array) -> Array:
-    """How far steps (b, 6 n) of z turn a goal at most, (b,), [rad]."""
+    """How far steps (b, 6 n) of z turn a pose at most, (b,), [rad]."""
     rotations = twists(step, L[:, :, 3:])
     return np.asarray(np.sqrt((rotations * rotations).sum(axis=2).max(axis=1, initial=0.0)))

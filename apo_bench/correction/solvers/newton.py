@@ -4,7 +4,7 @@ Eq. 12 is J dq = -e, with J = df/dq, and Eq. 14 decomposes J = U W V^t. Eq. 22 i
 count and puts 0 for the others, which is W*, so that dq = -V W* U^t e (Eq. 23). Eq. 13 adds dq to q; here the poses
 take dq in and q starts at 0 again, since the derivatives of the appendix hold at q = 0 only.
 
-Two numbers that the paper does not give decide whether redundant directions stay where they were seen:
+Two numbers that the paper does not give decide whether redundant directions stay where they were observed:
 
 - Radians and metres share one matrix, so the columns of rotations are measured as the way of a point `LENGTH_M` off
   the origin of the part, about half a block. Unscaled columns let rotations dominate, and a cut-off then removes
@@ -38,12 +38,12 @@ REST_M = 1e-9
 class Solution:
     """The result of the solver, converged or not."""
 
-    goals: Array
+    poses: Array
     """(n, 4, 4); the given ones, if a number was not finite on the way."""
     gap_m: float
-    """Largest |e| at these goals."""
+    """Largest |e| at these poses."""
     rank: int
-    """Directions that the equations fix, at these goals."""
+    """Directions that the equations fix, at these poses."""
     at_rest: bool
     finite: bool
     trace: tuple[Iterate, ...]
@@ -51,27 +51,27 @@ class Solution:
 
 def solve_newton(
     equations: Equations,
-    goals: Array,
+    poses: Array,
     free: Collection[int],
     *,
     cut_off: float = SINGULAR_CUT_OFF,
     length_m: float = LENGTH_M,
     iterations: int = _ITERATIONS,
 ) -> Solution:
-    """Change the free goals, as little as the contacts ask for, until the equations hold or nothing moves any more.
+    """Change the free poses, as little as the contacts ask for, until the equations hold or nothing moves any more.
 
     The rank counts where the solver rests, not where it begins: if noise made it look larger on the way, the way is
     gone once more, with no more directions than that.
 
     Args:
         equations: All equations that contain a free motion parameter.
-        goals: (n, 4, 4), where to begin, world frame, [m].
+        poses: (n, 4, 4), where to begin, world frame, [m].
         free: Operations whose motion parameters may change, counted from 0.
     """
-    solution = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, iterations=iterations)
+    solution = descend(equations, poses, free, cut_off=cut_off, length_m=length_m, iterations=iterations)
     if solution.at_rest and any(iterate.rank > solution.rank for iterate in solution.trace):
         again = descend(
-            equations, goals, free, cut_off=cut_off, length_m=length_m, iterations=iterations, at_most=solution.rank
+            equations, poses, free, cut_off=cut_off, length_m=length_m, iterations=iterations, at_most=solution.rank
         )
         if again.at_rest and again.gap_m <= solution.gap_m + REST_M:
             return again
@@ -80,7 +80,7 @@ def solve_newton(
 
 def descend(
     equations: Equations,
-    goals: Array,
+    poses: Array,
     free: Collection[int],
     *,
     cut_off: float = SINGULAR_CUT_OFF,
@@ -89,7 +89,7 @@ def descend(
     at_most: int | None = None,
 ) -> Solution:
     """One descent: at each iteration T <- T dT(dq), q <- 0, of the rank that the cut-off finds or `at_most`."""
-    now = np.array(goals)
+    now = np.array(poses)
     changing = np.array(sorted(free), dtype=np.intp)
     trace = list[Iterate]()
     # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 12 with scaled unknowns).
@@ -100,7 +100,7 @@ def descend(
         try:
             step, rank = least_step(J[:, columns] / units, e, cut_off, at_most)
         except np.linalg.LinAlgError:
-            return Solution(np.array(goals), trace[0].gap_m if trace else largest(e), 0, False, False, tuple(trace))
+            return Solution(np.array(poses), trace[0].gap_m if trace else largest(e), 0, False, False, tuple(trace))
         size = float(np.linalg.norm(step))
         trace.append(Iterate(largest(e), rank, size))
         if size < REST_M or iteration == iterations:

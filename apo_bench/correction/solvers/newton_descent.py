@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
-from apo_bench.correction.solvers.linear_step import goals_at
+from apo_bench.correction.solvers.linear_step import poses_at
 from apo_bench.correction.solvers.whitened import correction_to
 from apo_bench.geometry import Array
 
@@ -24,14 +24,14 @@ _FLAT = 1e-6
 """Curvature along a free direction, at least: 1 where contacts do not bend."""
 
 
-def descended(system: CompactEquations, observed: Array, L: Array, goals: Array) -> Array:
-    """The nearest goals near consistent ones, (n, 4, 4).
+def descended(system: CompactEquations, observed: Array, L: Array, poses: Array) -> Array:
+    """The nearest poses near consistent ones, (n, 4, 4).
 
     Args:
-        observed: (n, 4, 4), what was seen, world frame, [m].
+        observed: (n, 4, 4), what was observed, world frame, [m].
         L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
     """
-    z = correction_to(observed, L, goals)
+    z = correction_to(observed, L, poses)
     for _ in range(_ITERATIONS):
         (e,), (Jt,) = _linearised(system, observed, L, z[None])
         # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
@@ -53,9 +53,9 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         z = z + shortened_step(step, L)
         if np.abs(step).max() < STEP:
             break
-    return goals_at(observed, L[None], z[None])[0][0]
+    return poses_at(observed, L[None], z[None])[0][0]
 
 
 def _linearised(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
     """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
-    return linearised_by(system, *goals_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))
+    return linearised_by(system, *poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

@@ -1,7 +1,7 @@
 """What is still uncertain after a correction: the rank of the contacts, the free directions, the posterior covariance.
 
 At a solution, singular values of the Jacobian that belong to redundant equations or free directions are rounding, so
-the rank is beyond doubt there, where it is a matter of thresholds at what was seen. The corrected z is uncertain
+the rank is beyond doubt there, where it is a matter of thresholds at what was observed. The corrected z is uncertain
 within the tangent space of the contact manifold only, and there as much as the observation was: with an orthonormal
 basis N of the null space, cov(z) = N N^t.
 """
@@ -172,10 +172,10 @@ def _row_space(Jt: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 def marginals(B: Array, free: Array) -> Array:
-    """The posterior covariance of the body twist of each corrected goal, (b, n, 6, 6), [m, rad].
+    """The posterior covariance of the body twist of each corrected pose, (b, n, 6, 6), [m, rad].
 
     Args:
-        B: (b, n, 6, 6) or (b, n, 6, 6 n), as of `NearestGoals`.
+        B: (b, n, 6, 6) or (b, n, 6, 6 n), as of `NearestPoses`.
         free: (b, 6 n, f): an orthonormal basis of what is free, or the projection onto it.
     """
     b, n, _, width = B.shape

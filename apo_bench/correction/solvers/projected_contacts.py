@@ -18,14 +18,14 @@ _ONE = np.eye(4)
 @final
 @dataclass(frozen=True, eq=False)
 class ProjectedContacts:
-    """The equations of all contacts, and their vertices, laid at some goals."""
+    """The equations of all contacts, and their vertices, laid at some poses."""
 
     system: CompactEquations
     """With points (*, c, 3, 4)."""
     vertex: Array
     """(*, m, 4), frame of the environment part, [m]."""
     forms: Array
-    """(*, c, 4): as of `CompactEquations.forms`, at these goals."""
+    """(*, c, 4): as of `CompactEquations.forms`, at these poses."""
     pattern: Pattern
 
     def only(self, some: slice) -> "ProjectedContacts":
@@ -44,11 +44,11 @@ class ProjectedContacts:
         return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
 
 
-def project_vertices(assembly: Assembly, start: Array, plane: Array, goals: Array) -> ProjectedContacts:
-    """The equations of all contacts of an assembly, vertices where they are at the goals, (*, n, 4, 4).
+def project_vertices(assembly: Assembly, start: Array, plane: Array, poses: Array) -> ProjectedContacts:
+    """The equations of all contacts of an assembly, vertices where they are at the poses, (*, n, 4, 4).
 
     Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
-    taken back by the word of their contact at the goals, and dropped onto its plane. That is one affine map for each
+    taken back by the word of their contact at the poses, and dropped onto its plane. That is one affine map for each
     contact, which takes the three points that stand for the vertices along.
 
     Args:
@@ -57,7 +57,7 @@ def project_vertices(assembly: Assembly, start: Array, plane: Array, goals: Arra
     """
     corners = _corners(assembly)
     constants = corners.words.constants(start)
-    products = corners.words.products(constants, goals)
+    products = corners.words.products(constants, poses)
     maps = np.where(corners.laid, corners.drops @ pose.inverse(products), _ONE)
     vertex = (maps.take(corners.pattern.contact, axis=-3) @ corners.vertex)[..., 0]
     points = corners.points @ np.swapaxes(maps, -1, -2)

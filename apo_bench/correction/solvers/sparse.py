@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.linear_step import goals_at, turn_of
+from apo_bench.correction.solvers.linear_step import poses_at, turn_of
 from apo_bench.geometry import Array
 
 WIDE = 240
@@ -114,7 +114,7 @@ class SparseStep:
         return self._system.forms(self.T)
 
     def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
-        self.T, self.B = goals_at(self._observed, self._L, z)
+        self.T, self.B = poses_at(self._observed, self._L, z)
         e, every = self._system.blocks(self.T[0], self.B[0])
         self.e = e[None]
         self._blocks = every[self._where.contact, self._where.letter]

@@ -17,19 +17,19 @@ from apo_bench.geometry import Array, pose, right_jacobian
 @final
 @dataclass(frozen=True, eq=False)
 class Whitened:
-    """The motion parameters of n operations as a vector z, (6 n,), that is zero at what was seen."""
+    """The motion parameters of n operations as a vector z, (6 n,), that is zero at what was observed."""
 
     observed: Array
     """(n, 4, 4), world frame, [m]."""
     factor: Array
     """(n, 6, 6) or (n, 6, 6 n), L, [m, rad]."""
 
-    def goals(self, z: Array) -> Array:
+    def poses(self, z: Array) -> Array:
         """T_seen exp(L z), (n, 4, 4)."""
         return np.asarray(self.observed @ pose.exp(twists_of(self.factor, z)))
 
     def pulled(self, z: Array, J: Array) -> Array:
-        """A derivative by the body twists of the goals at z, (m, 6 n), as the derivative by z."""
+        """A derivative by the body twists of the poses at z, (m, 6 n), as the derivative by z."""
         return pulled(J, right_jacobian(twists_of(self.factor, z)) @ self.factor)
 
 
@@ -90,9 +90,9 @@ def noise_factor(observation: Observation) -> Array:
         ) from None
 
 
-def correction_to(observed: Array, L: Array, goals: Array) -> Array:
-    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n)."""
-    return coordinates_of(L, pose.log(pose.inverse(observed) @ goals))
+def correction_to(observed: Array, L: Array, poses: Array) -> Array:
+    """z of poses (*, n, 4, 4), the shortest that leads there from what was observed, (n, 4, 4): (*, 6 n)."""
+    return coordinates_of(L, pose.log(pose.inverse(observed) @ poses))
 
 
 def scales(covariance: Array) -> Array:

@@ -23,7 +23,7 @@ class Words:
     """c words of at most w letters, in the motion parameters of n operations and p constants."""
 
     letters: NDArray[np.intp]
-    """(c, w): as in `Equations`: p constants, then n goals, then the identity as padding."""
+    """(c, w): as in `Equations`: p constants, then n poses, then the identity as padding."""
     inverse: NDArray[np.bool_]
     """(c, w): which letters are inverted."""
     p: int
@@ -65,7 +65,7 @@ class Words:
         return np.array([self.letters, self.columns, self.inverse], dtype=np.intp)
 
     def constants(self, start: Array) -> Array:
-        """All matrices and then their inverses, (2, p + n + 1, 4, 4), of the goals the last row alone.
+        """All matrices and then their inverses, (2, p + n + 1, 4, 4), of the poses the last row alone.
 
         Args:
             start: (p, 4, 4): the constant motion parameters.
@@ -78,7 +78,7 @@ class Words:
         return stack
 
     def factors(self, constants: Array, T: Array) -> Array:
-        """Every letter of every word, (*, c, w, 4, 4), at the goals T, (*, n, 4, 4)."""
+        """Every letter of every word, (*, c, w, 4, 4), at the poses T, (*, n, 4, 4)."""
         first = self.p
         last = first + self.n
         stack = np.empty((*T.shape[:-3], *constants.shape))
@@ -88,7 +88,7 @@ class Words:
         return stack.reshape(*T.shape[:-3], 2 * constants.shape[1], 4, 4).take(self._rows, axis=-3)
 
     def products(self, constants: Array, T: Array) -> Array:
-        """D_a^-1 D_b of every contact, (*, c, 4, 4), at the goals T, (*, n, 4, 4)."""
+        """D_a^-1 D_b of every contact, (*, c, 4, 4), at the poses T, (*, n, 4, 4)."""
         F = self.factors(constants, T)
         M = np.broadcast_to(_ONE, (*F.shape[:-3], 4, 4))
         for j in range(F.shape[-3]):

@@ -80,7 +80,7 @@ def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: Res
     """The way in."""
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
     line = arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
-    return Stroke(goal.T, line.way, line.travel, goal.around)
+    return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
 def _places_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator[list[Grasp]]:

@@ -10,7 +10,7 @@ from itertools import combinations, product
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 from apo_bench.scenario.checks import DEEP_M
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Contact, Facing, Observation, placements
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
 from apo_bench.perception.detection.candidate import Candidate, judge_pair

@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Contact, Facing, Observation
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.detection.belief import Belief, PartBeliefs
 from apo_bench.perception.detection.candidate import Candidate, judge_pair

@@ -2,7 +2,7 @@
 
 Every contact normal n, from what rests into the free side of what moves, admits the motions with n x >= 0. Directions
 in which all of them stay closed are *maintaining*, those that only open some *detaching*, all others *constraining*;
-for translations the three numbers add up to 3, which leaves ten states. Rows of six numbers (screws) work alike.
+for translations the three numbers add up to 3, which leaves ten states. So do rows of six numbers (screws).
 """
 
 from dataclasses import dataclass
@@ -148,7 +148,7 @@ def null_space(rows: Array) -> Array:
 def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
     """Unit normals, (k, 3), of which those within an angle of an earlier one, or of its opposite, become that.
 
-    Between two walls a part is held; between two that are seen a little askew it would seem to be in a wedge.
+    Between two walls a part is held; between two that are observed a little askew it would seem to be in a wedge.
     """
     axes: list[Array] = []
     snapped = np.empty_like(normals)

@@ -14,7 +14,7 @@ OVER_M = 0.02
 
 
 def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tuple[Array, ...]:
-    """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are believed to be."""
+    """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are assumed to be."""
     sides: list[Array] = []
     for macro in arrival.macros:
         if macro.name == "slide-to-contact":
@@ -28,7 +28,7 @@ def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tupl
 
 
 def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
-    """A normal of what is touched, (3,), world, where the parts are believed to be."""
+    """A normal of what is touched, (3,), world, where the parts are assumed to be."""
     contact = arrival.touched[i].contact
     rests = arrival.touched[i].rests
     place = sum(each.contact == contact for each in arrival.touched[:i])

@@ -1,1 +1,1 @@
-"""Will a plan fail, where and why? Said before anything moves."""
+"""Failure prediction: whether a plan will fail, where and why, before anything moves."""

@@ -1,4 +1,4 @@
-"""Will a plan fail, where and why? Said before anything moves, from the plan, the sizes of the parts and the arm.
+"""Failure prediction: whether a plan will fail, where and why, from the plan, the sizes of the parts and the arm.
 
 What is looked at stands in `prediction/measures.py`; what the arm does not reach comes before all but an unstable goal.
 """

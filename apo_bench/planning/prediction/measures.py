@@ -6,7 +6,7 @@ sides that are slid onto each other what stays open once one corner touches, sin
 supports none, since weight closes them however wrong the plan is. A part that stays where it does not stand on what
 lies below alone: it leans as far as clearances let it. Parts that are planned into one another where no contact is
 meant, at the goal or on the way in; of those that touch in the same operation the contacts have told, except where a
-level way in begins: there a part comes down beside all others.
+level way in begins: there a part comes down next to all others.
 
 Where it is known what an arm makes of the plan, as plain numbers that somebody who knows the arm works out: whether
 its open gripper has room, and whether contacts that would be near enough still are with the error of its tip.
@@ -66,7 +66,7 @@ class ArmMove:
     sag: Array = field(default_factory=lambda: np.eye(4))
     """Where the weight of what is held takes it, a displacement of the world, (4, 4), [m]."""
     beside_mm: float = 0.0
-    """How far the tip goes beside its line, moving, at most."""
+    """How far the tip deviates from its line, moving, at most."""
     margin_deg: float | None = None
     """The least distance of a joint from its limits where the tip turns or stops; None where nothing is known of it."""
 
@@ -74,7 +74,7 @@ class ArmMove:
 MeasureKind = Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
 MeasureCode = Literal["residual", "interference", "unstable_goal", "gripper_room", "tip_error"]
 _ACROSS = 0.5
-"""A face whose normal makes a smaller cosine with the way in is a wall beside it."""
+"""A face whose normal makes a smaller cosine with the way in is a wall along it."""
 _BESIDE_MM = 1e-3
 """Parts that are less deep in each other only touch, whatever was rounded."""
 _CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
@@ -100,7 +100,7 @@ _SAID: Mapping[MeasureKind, tuple[MeasureCode, str]] = MappingProxyType(
         ),
     }
 )
-"""What is measured -> the code of what is too much, and what is said of it."""
+"""What is measured -> the code of what is too much, and what is stated of it."""
 
 
 class Measure(NamedTuple):
@@ -122,7 +122,7 @@ class Measure(NamedTuple):
 
     @property
     def code(self) -> MeasureCode:
-        """What is said of it if it is too much."""
+        """What is stated of it if it is too much."""
         return _SAID[self.kind][0]
 
     @property

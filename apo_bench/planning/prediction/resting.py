@@ -191,7 +191,7 @@ def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, phys
 def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:
     """How deep each part comes into each one that rests while it comes down to where a level way in begins, [m].
 
-    Parts count, too, that it shall touch in the end: there it has not come into them yet.
+    Parts that it touches in the end count, too: there it has not come into them yet.
 
     Returns:
         As `depths_on_way`; `-FAR_M` of any other way in.

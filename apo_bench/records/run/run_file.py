@@ -84,6 +84,7 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
         before = read_run(folder)
     except InputError as error:
         raise InputError(f"'{folder}' has trials but no readable run.json ({error}); choose another folder.") from error
+    require(before, f"'{folder}' has trials but no readable run.json; choose another folder.")
     schema = before.get("schema")
     require(
         schema == _RUN, f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder."

@@ -9,7 +9,7 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise, trace
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, STRETCH_M, TipError, error_on, rise, trace
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
@@ -66,9 +66,9 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     """Try an arm at the table of a scenario.
 
     Args:
-        layouts: How many layouts are looked at.
+        layouts: How many layouts are checked.
     """
-    missing = unsaid(arm)
+    missing = missing_data(arm)
     try:
         scene = build_scene(scenario, arm=arm)
     except InputError as error:
@@ -118,7 +118,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     )
 
 
-def unsaid(arm: Arm) -> list[str]:
+def missing_data(arm: Arm) -> list[str]:
     """What a file could say and does not, and what is wrong with the gripper that was measured."""
     missing = []
     if arm.limits.payload_kg is None:
@@ -152,8 +152,8 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
         with robot.watch_stability():
             rise(robot, 0.3)
             for i, speed in enumerate(SPEEDS):
-                way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-                end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+                length = STRETCH_M if speed > SPEEDS[0] else STRETCH_M / 10
+                end = translate(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), length)
                 line = (
                     smooth_trajectory(robot.T, end, speed)
                     if speed == SPEEDS[-1]

@@ -20,15 +20,15 @@ from apo_bench.simulation.scene import Scene
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
 _HIGH_M = 0.35
-"""Height at which errors are looked at, where the arm reaches it; else at that of its home."""
+"""Height at which errors are measured where the arm reaches it, else the height of its home."""
 _AHEAD_M = 0.25
 """Farther ahead of its base than this: a line beside its axis turns it fast."""
-WAY_M = 0.15
-"""Length of the way along which they are looked at."""
+STRETCH_M = 0.15
+"""Length of the line along which the errors are measured."""
 STAND_S = 0.3
 """How long the arm stands before it."""
 _RESTS_M = 2e-5  # the tip rests when it is this near to its command
-_LOOKS = 10  # the arm waits for that so often: weak joints swing behind
+_MOST_CHECKS = 10  # the arm waits for that so often: weak joints swing behind
 
 
 @final
@@ -56,8 +56,8 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     try:
         with robot.watch_stability():
             rise(robot, SPEEDS[-1])
-            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+            length = STRETCH_M if speed > SPEEDS[0] else STRETCH_M / 10
+            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), length), speed)
             return error_on(line, trace(robot, line), speed)
     except ExecutionAborted:
         return None
@@ -83,7 +83,7 @@ def trace(robot: Robot, line: Trajectory) -> Array:
 
 
 def rise(robot: Robot, speed: float) -> None:
-    """Go to where errors are looked at, at a speed [m/s], and come to rest there."""
+    """Go to where errors are measured, at a speed [m/s], and come to rest there."""
     up = np.array(robot.T)
     up[0, 3] = max(up[0, 3], robot.arm.base[0] + _AHEAD_M)
     up[2, 3] = _HIGH_M
@@ -92,21 +92,21 @@ def rise(robot: Robot, speed: float) -> None:
     if np.abs(up - robot.T).max() > 0.0:
         trace(robot, smooth_trajectory(robot.T, up, speed))
     robot.wait(STAND_S)
-    looks = 0
-    while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
+    checks = 0
+    while checks < _MOST_CHECKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
         robot.wait(STAND_S)
-        looks += 1
+        checks += 1
 
 
 def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
     """Of where the tip was at each step, (n, 4, 4): beside the line, along it behind the command, and turned."""
-    way = line.end[:3, 3] - line.start[:3, 3]
-    way = way / np.linalg.norm(way)
+    direction = line.end[:3, 3] - line.start[:3, 3]
+    direction = direction / np.linalg.norm(direction)
     n = len(tips)
     commanded = line.poses(line.progress(np.arange(1, n + 1) / n))
     off = tips[:, :3, 3] - commanded[:, :3, 3]
-    along = off @ way
-    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
+    along = off @ direction
+    beside = np.linalg.norm(off - along[:, None] * direction, axis=1)
     # The trace of R_commanded^T R is 1 + 2 cos(angle between them).
     turned = np.einsum("nij,nij->n", tips[:, :3, :3], commanded[:, :3, :3])
     angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))

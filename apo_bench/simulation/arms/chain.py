@@ -68,7 +68,7 @@ def _end_of(model: Any, body: int) -> Array:
     at = data.xanchor[joint]
     axis = data.xaxis[joint]
     fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == body)
-    ends = [max((geom_reach(model, data, int(g), way) for g in fixed), default=0.0) - at @ way for way in (axis, -axis)]
+    ends = [max((geom_reach(model, data, int(g), to) for g in fixed), default=0.0) - at @ to for to in (axis, -axis)]
     ahead = axis if ends[0] >= ends[1] else -axis
     across = np.cross(ahead, np.eye(3)[int(np.abs(ahead).argmin())])
     across /= np.linalg.norm(across)

@@ -136,8 +136,8 @@ def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_f
         grip, rise = _with_other_grip(robot, t, grip, second, T_found)
         left = _to_goal(robot, t, grip, rise, T_found)
     lower = rise if t.into.level else 0.0
-    guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.way, t.place_n)
-    robot.follow(steady_trajectory(robot.T, translate(robot.T, guard.way, lower + _OVERTRAVEL_M), _TOUCH), guard)
+    guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.direction, t.place_n)
+    robot.follow(steady_trajectory(robot.T, translate(robot.T, guard.direction, lower + _OVERTRAVEL_M), _TOUCH), guard)
     robot.stand()
     _slides(robot, t, left)
     _leave_there(robot, t, grip, left)
@@ -147,7 +147,7 @@ def end_of_attach(t: Transfer, grip: Grip, second: Grip | None) -> Array:
     """The tip pose at which the guarded motion ends, or the first of two with a change of the grip between, (4, 4)."""
     goal = first_contact_pose(t)
     if second is not None and t.into.left is not None:
-        goal = translate(t.T_world_goal, t.into.way, -t.into.left)
+        goal = translate(t.T_world_goal, t.into.direction, -t.into.left)
     return translate(goal, UP, t.floats if t.into.level else 0.0) @ grip.T_part_tip
 
 
@@ -189,7 +189,7 @@ def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     """Over everything that stands, down to where the last motion begins; there the arm stands and weighs its load."""
     robot.stage = "carry"
-    before = translate(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
+    before = translate(first_contact_pose(t) @ grip.T_part_tip, t.into.direction, -t.begins)
     if t.into.level:
         before = translate(before, UP, t.floats)
     robot.steady(True)
@@ -229,7 +229,7 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
     T_search = None
     if t.into.left is not None and second is not None:
         line = _into(robot, t, end_of_attach(t, grip, second), t.into.left)
-        left, T_search = press_in(robot, t, grip, line, Guard(t.into.way, t.insert_n), _ARRIVED_M)
+        left, T_search = press_in(robot, t, grip, line, Guard(t.into.direction, t.insert_n), _ARRIVED_M)
         if left > _ARRIVED_M:
             return left + t.into.left, grip
         grip, rise = _with_other_grip(robot, t, grip, second, T_search)
@@ -242,7 +242,7 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
 
 def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_search: Array | None) -> tuple[Grip, float]:
     """Take the part at its second place, and lift it off the floor; returns that grip, and how far up the part is."""
-    there = translate(translate(t.T_world_goal, t.into.way, -(t.into.left or 0.0)), UP, t.floats)
+    there = translate(translate(t.T_world_goal, t.into.direction, -(t.into.left or 0.0)), UP, t.floats)
     change_grip(robot, t, grip, second, after_search(T_search, translate(there, UP, -t.floats) @ second.T_part_tip))
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.clearance), 0.01))
     return second, t.clearance
@@ -250,26 +250,26 @@ def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_sear
 
 def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array | None) -> float:
     """The guarded level line to the goal, and against a bottom; returns what is left of it, [m]."""
-    guard = Guard(t.into.way, t.insert_n)
+    guard = Guard(t.into.direction, t.insert_n)
     goal = after_search(T_search, translate(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if not any(macro.name == "move-to-bottom" for macro in t.macros):
         return press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)[0]
-    line = _into(robot, t, translate(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
+    line = _into(robot, t, translate(goal, t.into.direction, -_BOTTOM_M), _BOTTOM_M)
     left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
     if left == 0.0:
-        beyond = after_search(T_search, translate(goal, t.into.way, _OVERTRAVEL_M))
+        beyond = after_search(T_search, translate(goal, t.into.direction, _OVERTRAVEL_M))
         robot.follow(steady_trajectory(robot.T, beyond, _TOUCH), guard)
     return left
 
 
 def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     """From above, slowly where contact may come any moment, until the part stands."""
-    down = Guard(t.into.way, t.place_n)
+    down = Guard(t.into.direction, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
-    above = steady_trajectory(robot.T, translate(goal, t.into.way, -t.slow), _PLACE)
+    above = steady_trajectory(robot.T, translate(goal, t.into.direction, -t.slow), _PLACE)
     left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
-        end = after_search(T_search, translate(goal, t.into.way, _OVERTRAVEL_M))
+        end = after_search(T_search, translate(goal, t.into.direction, _OVERTRAVEL_M))
         press_in(robot, t, grip, steady_trajectory(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
     robot.stand()
 
@@ -306,13 +306,13 @@ def _pull_out(robot: Robot, t: Transfer) -> int:
     robot.stage = "lift"
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.floats), 0.01))
     if t.out.left is None:
-        robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, -t.out.travel), _PULL))
+        robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.direction, -t.out.travel), _PULL))
         return 0
-    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, -t.out.left), _PULL))
-    part = translate(t.T_world_start, t.out.way, -t.out.left)
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.direction, -t.out.left), _PULL))
+    part = translate(t.T_world_start, t.out.direction, -t.out.left)
     change_grip(robot, t, t.grips[0], t.grips[1], part @ t.grips[1].T_part_tip)
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, t.floats), 0.01))
-    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, t.out.direction, t.out.left - t.out.travel), _PULL))
     return 1
 
 

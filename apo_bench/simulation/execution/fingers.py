@@ -30,8 +30,8 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
     level = with_height(above, robot.T[2, 3])
     # A short arm does not reach as far out as here where it waits, or has passed over other parts.
-    way = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
-    is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, way, robot.q) is None
+    between = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
+    is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, between, robot.q) is None
     robot.go(with_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))

@@ -40,7 +40,7 @@ class FlatPlacement(NamedTuple):
 
 def before_insertion(t: Transfer) -> Array:
     """Where a part is when its last motion begins, (4, 4), world."""
-    before = translate(first_contact_pose(t), t.into.way, -t.begins)
+    before = translate(first_contact_pose(t), t.into.direction, -t.begins)
     return translate(before, UP, t.floats) if t.into.level else before
 
 

@@ -34,7 +34,7 @@ _MARGINS_M = (0.004, 0.003, 0.002)
 _GRID_M = 0.003
 """Candidates along a part, and looks along a stroke, are this far apart."""
 _SOME = (0, 1, 9, 73, None)
-"""So many places are looked at together."""
+"""So many places are checked in one call."""
 _END_M = 0.018
 """No grasp is nearer to the end of a long part: the pads still lie on it."""
 _MOST_LEFT_M = 0.1
@@ -57,7 +57,7 @@ class Stroke(NamedTuple):
     """A straight way of the part to `T`."""
 
     T: Array
-    way: Array
+    direction: Array
     """Unit vector, (3,), world."""
     travel: float
     around: tuple[Obstacle, ...]
@@ -174,9 +174,9 @@ def _pair(
     goal = RestingPart(stroke.T, stroke.around)
     last = list(_clear(scene.kinematics, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
-        change = RestingPart(translate(stroke.T, stroke.way, -left), stroke.around)
+        change = RestingPart(translate(stroke.T, stroke.direction, -left), stroke.around)
         if 0.0 < left < _MOST_LEFT_M and any(_clear(scene.kinematics, solid, [first], [change], margin)):
-            near = Stroke(stroke.T, stroke.way, left, stroke.around)
+            near = Stroke(stroke.T, stroke.direction, left, stroke.around)
             for second in _clear(scene.kinematics, solid, last, [change], margin):
                 if _nearest(scene.kinematics, solid, second, near, margin) == 0.0:
                     return Grips(first, left, second)
@@ -281,7 +281,7 @@ def _is_clear(
         able = np.flatnonzero(free)
         if len(able) and stroke.travel > 0.0:
             R, at = _tips(same[0], points[able], stroke.T)
-            every = (at[:, None] - _lefts(stroke)[:, None] * stroke.way).reshape(-1, 3)
+            every = (at[:, None] - _lefts(stroke)[:, None] * stroke.direction).reshape(-1, 3)
             depth = gripper_depth(kinematics, width, R, every, stroke.around, margin)
             free[able] = (depth.reshape(len(able), -1) <= 0.0).all(axis=1)
     return free
@@ -311,7 +311,7 @@ def _closed_depth(
     """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
     width = _known_width(solid.pieces, grasp, stroke.T)
     tip = stroke.T @ tip_frame(grasp, stroke.T)
-    at = tip[:3, 3] - lefts[:, None] * stroke.way
+    at = tip[:3, 3] - lefts[:, None] * stroke.direction
     return gripper_depth(kinematics, width, tip[:3, :3], at, stroke.around, margin)
 
 

@@ -38,14 +38,14 @@ def transfer_grips(
     start = RestingPart(estimated[part], obstacles(scene.scenario.assembly.solids, estimated, (part,)))
     goal = RestingPart(after[part], obstacles(scene.scenario.assembly.solids, after, (part,)))
     if into.level:
-        stroke = Stroke(goal.T, into.way, into.travel, goal.around)
+        stroke = Stroke(goal.T, into.direction, into.travel, goal.around)
         grips = grips_along(scene, part, preferred, (start,), stroke)
-        into = ApproachLine(into.way, into.travel, grips.left)
+        into = ApproachLine(into.direction, into.travel, grips.left)
     elif out.level:
-        stroke = Stroke(start.T, out.way, out.travel, start.around)
+        stroke = Stroke(start.T, out.direction, out.travel, start.around)
         backwards = grips_along(scene, part, preferred, (goal,), stroke)
         grips = backwards if backwards.second is None else Grips(backwards.second, backwards.left, backwards.first)
-        out = ApproachLine(out.way, out.travel, backwards.left)
+        out = ApproachLine(out.direction, out.travel, backwards.left)
     else:
         grips = Grips(grasp_at(scene, part, preferred, (start, goal)))
     grasps = (grips.first,) if grips.second is None else (grips.first, grips.second)
@@ -71,7 +71,7 @@ def centring_grips(
     or onto the part later needs it in its place across the walls of that fit.
     """
     part = assembly.operations[k].main
-    sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
+    sides = [macro.direction for macro in macros if macro.name == "slide-to-contact"]
     place = RestingPart(after[part], obstacles(assembly.solids, after, (part,)))
     grasps = _across_walls(scene, part, grip, later_walls(assembly, k, part), place, sides)
     return tuple(_grip(scene, part, grasp, place.T, place.T) for grasp in grasps)
@@ -106,7 +106,7 @@ def _across_walls(
     settled = [R @ grip.T_part_tip[:3, 0], *sides]
     grasps = []
     for wall in walls:
-        if abs((R @ wall)[2]) < 0.5 and all(abs(R @ wall @ way) < 0.5 for way in settled):
+        if abs((R @ wall)[2]) < 0.5 and all(abs(R @ wall @ direction) < 0.5 for direction in settled):
             settled.append(R @ wall)
             grasp = clear_across(scene, part, wall, place)
             grasps += [] if grasp is None else [grasp]

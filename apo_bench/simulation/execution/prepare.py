@@ -61,7 +61,7 @@ class Move(NamedTuple):
 def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part stays with it.
 
-    Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
+    Cached: the plan check and the execution both need it.
 
     Args:
         spiral: Whether the robot searches for a hole where a motion into it is stopped.
@@ -152,7 +152,7 @@ def _transfer(
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
-    ways = mouths(assembly, comes, after, into.way)
+    ways = mouths(assembly, comes, after, into.direction)
     first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
@@ -168,14 +168,14 @@ def _transfer(
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
-        slow=max(slow_before(assembly, comes, after, into.way), first + WALL_MARGIN_M),
+        slow=max(slow_before(assembly, comes, after, into.direction), first + WALL_MARGIN_M),
         entrances=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
         insert_n=_INSERT_WEIGHTS * min(near, default=held),
         slide_n=_SLIDE_WEIGHTS * min(near, default=held),
         clearance=1e-3 * scene.clearance_mm,
-        front=_front(scene, part, operation.moves, after, into.way) if spiral and inserts else None,
+        front=_front(scene, part, operation.moves, after, into.direction) if spiral and inserts else None,
     )
 
 
@@ -205,7 +205,7 @@ def _with_actions(
     )
 
 
-def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: Array) -> Array:
+def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, direction: Array) -> Array:
     """The middle of where what moves ends ahead, in the frame of its main part, (3,), [m].
 
     It is the middle of the upright box around what moves, in that frame, put forward to the end along the way.
@@ -217,7 +217,7 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: A
         return float(np.min(spans)), float(np.max(spans))
 
     middle = np.array([np.mean(ends(axis)) for axis in np.eye(3)])
-    ahead = poses[part][:3, :3].T @ way
+    ahead = poses[part][:3, :3].T @ direction
     return np.asarray(middle + (ends(ahead)[1] - middle @ ahead) * ahead)
 
 
@@ -254,8 +254,8 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     if len(reached) == len(taken + put) and scene.arm.hand is not None:
         # What is held goes through the air from the last of the first to the first of the others.
         k = len(taken)
-        way = plan_waypoints(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
-        if follow_waypoints(scene.kinematics, taken[-1], way, reached[k - 1]) is None:
+        direction = plan_waypoints(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
+        if follow_waypoints(scene.kinematics, taken[-1], direction, reached[k - 1]) is None:
             reached = reached[:k]
     if len(reached) == len(taken + put):
         return KeyAngles("", tuple(reached), q)

@@ -45,18 +45,18 @@ def press_in(
     for _ in range(SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
-        stopped = translate(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
+        stopped = translate(end, guard.direction, float((robot.T - end)[:3, 3] @ guard.direction))
         macro = robot.macro
         robot.macro = "search"
         more = search_hole(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
         robot.macro = macro
         if more is None:
             break
-        guard = Guard(more[:3, :3] @ guard.way, guard.newton)
+        guard = Guard(more[:3, :3] @ guard.direction, guard.newton)
         more = translate(more, _ease_in(robot, more @ end, guard), 1.0)
         T_search = more if T_search is None else more @ T_search
         end = more @ end
-        left = float((end - robot.T)[:3, 3] @ guard.way)
+        left = float((end - robot.T)[:3, 3] @ guard.direction)
         aside = float(np.linalg.norm((end - line.end)[:3, 3]))
     return left, T_search
 
@@ -78,35 +78,35 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
     Returns:
         What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
     """
-    off = translate(stopped, guard.way, -_BACK_M)
+    off = translate(stopped, guard.direction, -_BACK_M)
     for yaw in (0.0, *YAWS_DEG):
         turn = _yaw_about(yaw, front)
-        _approach(robot, turn @ off, guard.way)
-        turned = Guard(turn[:3, :3] @ guard.way, guard.newton)
+        _approach(robot, turn @ off, guard.direction)
+        turned = Guard(turn[:3, :3] @ guard.direction, guard.newton)
         far = min(radius, YAWED_RADIUS_M) if yaw else radius
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         servo(robot, spiral)
         if spiral.found:
             return translate(turn, spiral.aside, 1.0)
-    _approach(robot, off, guard.way)
+    _approach(robot, off, guard.direction)
     robot.follow(smooth_trajectory(robot.T, stopped, _BACK), guard)
     return None
 
 
 def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
     """Go on as deep as a tip pose, giving way across; returns how far aside of it the tip ends, (3,), world, [m]."""
-    while (left := float((end - robot.T)[:3, 3] @ guard.way)) > _NOTHING_M:
+    while (left := float((end - robot.T)[:3, 3] @ guard.direction)) > _NOTHING_M:
         easing = Easing(guard, min(left, _PIECE_M), robot.step_s)
         servo(robot, easing)
         if easing.stopped:
             break
     off = (robot.T - end)[:3, 3]
-    return np.asarray(off - (off @ guard.way) * guard.way)
+    return np.asarray(off - (off @ guard.direction) * guard.direction)
 
 
-def _approach(robot: Robot, T: Array, way: Array) -> None:
+def _approach(robot: Robot, T: Array, direction: Array) -> None:
     """Back first, so that nothing is touched on the way."""
-    robot.follow(smooth_trajectory(robot.T, translate(robot.T, way, -_BACK_M), _BACK))
+    robot.follow(smooth_trajectory(robot.T, translate(robot.T, direction, -_BACK_M), _BACK))
     robot.follow(smooth_trajectory(robot.T, T, _BRING))
 
 

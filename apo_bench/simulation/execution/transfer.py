@@ -46,7 +46,7 @@ class Grip(NamedTuple):
 class ApproachLine:
     """A straight way of the part, in the direction in which the part is attached."""
 
-    way: Array
+    direction: Array
     """Unit vector of the motion towards the goal, (3,), world."""
     travel: float
     left: float | None = None
@@ -54,14 +54,14 @@ class ApproachLine:
 
     @property
     def level(self) -> bool:
-        return bool(abs(self.way[2]) < 0.5)
+        return bool(abs(self.direction[2]) < 0.5)
 
 
 class Motion(NamedTuple):
     """A macro of the plan, as the robot carries it out."""
 
     name: MacroName
-    way: Array
+    direction: Array
     """Unit vector, (3,), world."""
 
 
@@ -120,7 +120,7 @@ class Transfer:
     @property
     def begins(self) -> float:
         """How far before the goal the guarded motion begins, [m]: straight from above, just before it turns slow."""
-        return min(self.into.travel, self.slow + _AHEAD_M) if self.into.way[2] < -_STRAIGHT else self.into.travel
+        return min(self.into.travel, self.slow + _AHEAD_M) if self.into.direction[2] < -_STRAIGHT else self.into.travel
 
     @property
     def foremost(self) -> Array:
@@ -140,17 +140,18 @@ class Transfer:
     @property
     def sides(self) -> tuple[Array, ...]:
         """Directions in which the part is slid onto another one at its side, (3,) each."""
-        return tuple(macro.way for macro in self.macros if macro.name == "slide-to-contact")
+        return tuple(macro.direction for macro in self.macros if macro.name == "slide-to-contact")
 
     @property
     def away(self) -> tuple[Array, ...]:
         """Directions in which the part is first moved off another one at its side, (3,) each."""
-        return () if self.out.level else tuple(macro.way for macro in self.departs if abs(macro.way[2]) < 0.5)
+        directions = [macro.direction for macro in self.departs]
+        return () if self.out.level else tuple(each for each in directions if abs(each[2]) < 0.5)
 
     @property
     def drawn(self) -> bool:
         """Whether it is drawn up out of walls while it is lifted."""
-        return any(macro.way[2] > 0.5 for macro in self.departs)
+        return any(macro.direction[2] > 0.5 for macro in self.departs)
 
     @property
     def floats(self) -> float:
@@ -184,8 +185,8 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
     pick = t.T_world_start @ first
     goal = t.T_world_goal @ last
-    free = translate(t.T_world_start @ carrying, t.out.way, -t.out.travel)
-    before = translate(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
+    free = translate(t.T_world_start @ carrying, t.out.direction, -t.out.travel)
+    before = translate(t.T_world_goal @ carrying, t.into.direction, -t.into.travel)
     above, over = (with_height(T, max(t.safe, T[2, 3])) for T in (free, before))
     return (hover(pick), pick, *([free] if t.out.level else []), above), (over, before, goal)
 

@@ -27,7 +27,7 @@ class HandOperation:
     carries: tuple[str, ...]
     target: Array
     """(4, 4), of the part."""
-    way: Array
+    direction: Array
     """Unit vector of the last motion, (3,)."""
     travel: float
     out: Array
@@ -47,7 +47,7 @@ class HandOperation:
 
     @property
     def from_above(self) -> bool:
-        return bool(self.way[2] < -0.5)
+        return bool(self.direction[2] < -0.5)
 
 
 def plan_hand_operation(
@@ -63,7 +63,7 @@ def plan_hand_operation(
     assembly = scenario.assembly
     operation = assembly.operations[k]
     nominal = nominal_operations(scenario)[k]
-    way = target[:3, :3] @ nominal.after.line.direction
+    direction = target[:3, :3] @ nominal.after.line.direction
     on_floor = any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in nominal.after.touched)
     top, bottom = ends_of(assembly, operation.moves, stages[k])
     beside = _off(slide_directions(assembly, nominal.after, stages[k + 1]))
@@ -71,23 +71,23 @@ def plan_hand_operation(
         part=operation.main,
         carries=operation.carries,
         target=target,
-        way=way,
+        direction=direction,
         travel=nominal.after.line.travel_m,
         out=_out(assembly, nominal.before, stages[k]),
-        aside=_SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
+        aside=_SIDE_M * beside if direction[2] < -0.5 else np.zeros(3),
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
         over=top + (float(stages[k][operation.main][2, 3]) - bottom) + OVER_M,
-        drags=abs(way[2]) < 0.5 and on_floor,
+        drags=abs(direction[2]) < 0.5 and on_floor,
         late=late,
     )
 
 
 def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     """The motion, (3,) [m], that frees what moves: back out of where it sticks, or off what is beside."""
-    way = poses[before.main][:3, :3] @ before.line.direction
-    if before.touched and abs(way[2]) < 0.5:
-        return np.asarray(-before.line.travel_m * way)
+    direction = poses[before.main][:3, :3] @ before.line.direction
+    if before.touched and abs(direction[2]) < 0.5:
+        return np.asarray(-before.line.travel_m * direction)
     return _SIDE_M * _off(slide_directions(assembly, before, poses))
 
 

@@ -67,13 +67,13 @@ def _ends(hands: Hands, operation: HandOperation, T: Array, clearance_m: float) 
     if operation.from_above:
         goal = translate(operation.target, UP, _DROP_M + (_rise(hands, operation, T) if operation.carries else 0.0))
     beside = translate(goal, operation.aside, 1.0) if operation.aside.any() else goal
-    return translate(translate(target, operation.way, -operation.travel), operation.aside, 1.0), beside, goal
+    return translate(translate(target, operation.direction, -operation.travel), operation.aside, 1.0), beside, goal
 
 
 def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
     """How much higher a group must end than planned, as it hangs in the hand, so that nothing ends too deep, [m]."""
-    way = operation.target @ pose.inverse(T)
-    return max(float(operation.true[part][2, 3] - (way @ hands.pose(part))[2, 3]) for part in operation.bearing)
+    motion = operation.target @ pose.inverse(T)
+    return max(float(operation.true[part][2, 3] - (motion @ hands.pose(part))[2, 3]) for part in operation.bearing)
 
 
 def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:

@@ -90,7 +90,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
         wrist.end_zero()
 
 
-def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: WristSensor) -> float | None:
+def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist: WristSensor) -> float | None:
     """Follow a line until the filtered force against `way` passes `newton`, and stop there at once.
 
     The arm goes on while the sensor lags behind by its time constant. At 2 mm/s the blow of a first touch stays below
@@ -99,7 +99,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
     stops it.
 
     Args:
-        way: The direction of pressing, a unit vector, (3,), world.
+        direction: The direction of pressing, a unit vector, (3,), world.
 
     Returns:
         What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
@@ -109,7 +109,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
         ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
     """
     with reading(robot, wrist):
-        return robot.follow(line, Guard(way, newton)) or None
+        return robot.follow(line, Guard(direction, newton)) or None
 
 
 def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
@@ -127,7 +127,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
     with reading(robot, wrist):
         q = robot.q
         offset = np.zeros(6)
-        looked = offset
+        checked = offset
         J = _joint_turns(robot, q, about)
         passed = 0
         while (wanted := law(wrist.wrench(about + offset[:3]))) is not None:
@@ -138,9 +138,9 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
                 passed += 1
                 robot.servo_step(q, passed)
                 taken = wrist.take(robot.step_s)
-            far = np.abs(offset - looked)
+            far = np.abs(offset - checked)
             if far[:3].max() > _FAR_M or far[3:].max() > _FAR_RAD:
-                looked = offset
+                checked = offset
                 J = _joint_turns(robot, q, about + offset[:3])
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
@@ -152,7 +152,7 @@ def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
     to = pose.at(about)
     T_point_tip = pose.inverse(to) @ T
     turns = []
-    for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
-        ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
+    for twists, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
+        ends = [(to @ pose.exp(-by * unit) @ T_point_tip, to @ pose.exp(by * unit) @ T_point_tip) for unit in twists]
         turns.append(robot.reached(joint_gradients(robot.scene.kinematics, ends, q, by)))
     return np.vstack(turns)

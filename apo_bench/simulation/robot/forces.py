@@ -36,7 +36,7 @@ class LowPass:
 class Guard(NamedTuple):
     """Stop when the held part is pushed back along `way` by more than `newton`."""
 
-    way: Array
+    direction: Array
     newton: float
 
 

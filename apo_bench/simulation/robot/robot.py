@@ -158,7 +158,7 @@ class Robot:
         """Take one physics step towards joint angles, [rad], with a velocity, [rad/s], fed forward.
 
         Args:
-            passed: How many steps have passed: after a tick the robot looks for trouble.
+            passed: How many steps have passed: after each tick the robot checks its state.
 
         Returns:
             The force on the part in the hand, (3,) world, [N].
@@ -323,7 +323,7 @@ class Robot:
             mujoco.mj_step(model, data)
             return 0
         step_s = float(model.opt.timestep)
-        a, b, c = (0.0, 0.0, 0.0) if guard is None else guard.way.tolist()
+        a, b, c = (0.0, 0.0, 0.0) if guard is None else guard.direction.tolist()
         newton = math.inf if guard is None else guard.newton
         for steps, command in enumerate(commands, start=1):
             data.ctrl[:] = command

@@ -55,7 +55,7 @@ def picture_with_arm(
     """The parts where `poses` says, with the arm at home and its fingers open, (height, width, 3).
 
     Args:
-        state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
+        state: `qpos` of a replay, which is then shown as it is; of `poses` only those of fixed parts count.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     return _draw(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)

@@ -43,7 +43,7 @@ class Start:
     grip: Grip
     second: Grip | None
     """The grip after the guarded motion, if it is changed then."""
-    way: Array
+    direction: Array
     """The insertion axis by the robot's own estimate, unit vector, (3,), world."""
     off: Array
     """(joints,), by how much each joint is off its encoder, [rad]."""
@@ -120,7 +120,7 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
         transfer=t,
         grip=grip,
         second=second,
-        way=t.into.way if left is None else left.hand_eye[:3, :3].T @ t.into.way,
+        direction=t.into.direction if left is None else left.hand_eye[:3, :3].T @ t.into.direction,
         off=np.zeros(len(robot.scene.arm.joints)) if left is None else left.joints,
         saved=save_state(robot, i, execution.progress),
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _no_encoders, np.random.default_rng(0)),

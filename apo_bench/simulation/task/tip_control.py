@@ -32,7 +32,7 @@ PERIOD_S = 0.05
 """From one action to the next: 20 Hz."""
 _YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N], as in a search."""
-_FELT_S = 0.01
+_AVERAGED_S = 0.01
 """Forces are averaged over this time."""
 _GAIN = 0.6  # [m/s^2]: how fast the approach gains speed in free air
 _SOFT = 0.02  # [m/s^2]: and after a first touch
@@ -88,12 +88,12 @@ class TipControl:
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
         self._end = end_of_attach(t, start.grip, start.second)
         self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]
-        self._R = frame_of_way(t.into.way, self._end)
+        self._R = frame_of_direction(t.into.direction, self._end)
         self._pace = pace(t, start.second)
         self._guard = t.insert_n if t.into.level else t.place_n
         self._left = 0.0 if start.second is None else float(t.into.left or 0.0)
         self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
-        self._felt = LowPass(_FELT_S)
+        self._filtered = LowPass(_AVERAGED_S)
         self._force = robot.forces.net()
         self._speed = 0.0
         self._stopped: float | None = None
@@ -133,7 +133,7 @@ class TipControl:
         with allow_sleep(work, robot.scene.grasp == "friction"), robot.watch_stability():
             robot.stand()
             if self.arrived:
-                at_end = translate(robot.T, t.into.way, -float(self._off(robot.T)[2]))
+                at_end = translate(robot.T, t.into.direction, -float(self._off(robot.T)[2]))
                 after_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
             else:
                 release(robot, t, self.start.grip)
@@ -163,11 +163,11 @@ class TipControl:
         front = t.foremost[None]
         found = []
         for goal in goals:
-            way = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.way
+            direction = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.direction
             far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]
             turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
-            across = (far - (far @ way) * way) @ self._R
-            found.append([*across[:2], far @ way, *turn @ self._R])
+            across = (far - (far @ direction) * direction) @ self._R
+            found.append([*across[:2], far @ direction, *turn @ self._R])
         return np.asarray(np.mean(found, axis=0))
 
     def poses(self) -> Poses:
@@ -192,13 +192,13 @@ class TipControl:
         robot = self.robot
         dt = robot.step_s
         steps = round(PERIOD_S / dt)
-        way = self.start.transfer.into.way
+        direction = self.start.transfer.into.direction
         T = robot.T
         off = self._off(T)
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
         # What the linear kinematics of the last period left behind is made up for.
-        asked = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
+        wanted = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
         from_there = off[:3]
         moved = np.zeros(3)
         self._turn = np.clip(self._turn + turn, -_TURN_RAD, _TURN_RAD)
@@ -212,23 +212,23 @@ class TipControl:
         q = robot.q
         left = self._left - float(off[2])
         for _ in range(steps):
-            f = np.array(self._felt(self._force, dt))
-            push = -float(f @ way)
-            led = asked
+            f = np.array(self._filtered(self._force, dt))
+            push = -float(f @ direction)
+            advance = wanted
             yields = _YIELD * f
             if self.nominal:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
-                struck = -float(np.dot(self._force, way)) if self._speed > _STRUCK else push
+                struck = -float(np.dot(self._force, direction)) if self._speed > _STRUCK else push
                 if self._stopped is None and max(struck, side) > self._guard:
                     q = robot.encoders()
                     from_there = self._off(robot.scene.kinematics.forward(q))[:3]
                     moved = np.zeros(3)
                     self._speed, self._stopped = 0.0, left
-                led = asked + self._ahead(left, push, side, dt) * way
-                yields = yields + _YIELD * push * way
-            moved = moved + dt * (led + yields)
-            left = self._left - float(from_there[2] + moved @ way)
-            leads = turning + shifting @ led
+                advance = wanted + self._ahead(left, push, side, dt) * direction
+                yields = yields + _YIELD * push * direction
+            moved = moved + dt * (advance + yields)
+            left = self._left - float(from_there[2] + moved @ direction)
+            leads = turning + shifting @ advance
             q = q + dt * (leads + shifting @ yields)
             self._passed += 1
             self._force = robot.servo_step(q, self._passed, leads)
@@ -236,7 +236,7 @@ class TipControl:
         self._at = from_there + moved @ self._R
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
-        push = -float(np.dot(self._felt.force, way))
+        push = -float(np.dot(self._filtered.force, direction))
         self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
         here = left - self._pace.end
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
@@ -277,12 +277,12 @@ class TipControl:
         return TipReading(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
 
 
-def frame_of_way(way: Array, T_tip: Array) -> Array:
+def frame_of_direction(direction: Array, T_tip: Array) -> Array:
     """A frame whose third axis leads along a way, as columns in the world, (3, 3).
 
     The first axis is that along which the fingers close, as far as it is square to the way.
     """
-    first = T_tip[:3, 0] if abs(T_tip[:3, 0] @ way) < 0.7 else T_tip[:3, 1]
-    first = first - (first @ way) * way
+    first = T_tip[:3, 0] if abs(T_tip[:3, 0] @ direction) < 0.7 else T_tip[:3, 1]
+    first = first - (first @ direction) * direction
     first = first / np.linalg.norm(first)
-    return np.column_stack([first, np.cross(way, first), way])
+    return np.column_stack([first, np.cross(direction, first), direction])

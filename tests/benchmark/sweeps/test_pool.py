@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as imageio
 import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, run_sweep
@@ -134,35 +133,6 @@ def test_a_trial_that_hangs_is_ended_at_its_limit_and_the_others_go_on(
     assert "4" not in late["sentence"]
     assert "--trial-limit 4 " in replay_command(late, None, limits)
     assert replayed(late, capsys, limits) == json.loads(json.dumps(late))
-
-
-def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    film = tmp_path / "film.gif"
-    seen = tmp_path / "seen.json"
-    trial = [
-        "run",
-        "block_on_block",
-        "--human-error-scale",
-        "0",
-        "--fidelity",
-        "near-contact",
-        "--json",
-        "--trial-limit",
-        "500",
-    ]
-    written = ["--video", str(film), "--save-observation", str(seen)]
-    assert main([*trial, "--method", "uncorrected", *written, "--noise-level", "0.1"]) == 0
-    capsys.readouterr()
-    assert len(imageio.imread(film, index=None)) > 10
-    measured = ["run", "block_on_block", "--fidelity", "near-contact", "--observation", str(seen), "--json"]
-    assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
-    late = json.loads(capsys.readouterr().out)
-    assert (late["failure_code"], late["noise"], late["noise_mm"]) == ("time_limit", "measured", None)
-
-
-def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "block_on_block", "--method", "unruly:hangs", "--trial-limit", "-1"]) == 2
-    assert "a limit of -1 s per trial was given" in capsys.readouterr().err
 
 
 TALKS = [
@@ -293,18 +263,6 @@ def test_a_signal_leaves_whole_rows_and_no_process(
     wait_for(lambda: not any(worker.exists() for worker in workers))
     assert 2 <= count(tmp_path / "run") < 100
     assert (tmp_path / "run" / "trials.jsonl").read_bytes().endswith(b"\n")
-
-
-@PROCESSES
-@pytest.mark.slow
-def test_workers_end_when_the_sweep_is_killed(tmp_path: Path) -> None:
-    """Their rows would be written by nobody, and they would keep the machine busy."""
-    process = started(tmp_path / "run", ",".join(str(0.5 * k) for k in range(100)))
-    wait_for(lambda: count(tmp_path / "run") >= 2)
-    workers = children(process.pid)
-    process.kill()
-    process.communicate()
-    wait_for(lambda: not any(worker.exists() for worker in workers))
 
 
 def test_signals_raise_and_handlers_of_the_callers_own_stay() -> None:

@@ -112,7 +112,7 @@ def test_the_gradient_of_the_penalty_is_that_of_differences(name: str) -> None:
     h = 1e-6
     _, gradient = down(z)
     differences = [(down(z + h * e)[0] - down(z - h * e)[0]) / (2 * h) for e in np.eye(len(z))]
-    assert len(intruding(down.meetings, down.space.goals(z))) > 0
+    assert len(intruding(down.meetings, down.space.poses(z))) > 0
     assert np.allclose(gradient, differences, rtol=1e-5, atol=1e-6 * np.abs(gradient).max())
 
 

@@ -9,7 +9,7 @@ from apo_bench import correct
 from apo_bench.assembly import faces_away, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import compact_equations
-from apo_bench.correction.solvers.gauss_newton import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_poses
 from apo_bench.correction.solvers.newton_descent import descended
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
@@ -61,7 +61,7 @@ def test_where_contacts_bend_newton_ends_where_small_steps_would():
     assert length(seen, beside) > length(seen, goals)
     there = descended(system, seen.poses, L, beside)
     assert length(seen, there) == pytest.approx(length(seen, goals), rel=1e-9)
-    creeping = nearest_goals(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
+    creeping = nearest_poses(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
     assert not creeping.at_rest
-    assert length(seen, creeping.goals) > length(seen, there)
+    assert length(seen, creeping.poses) > length(seen, there)
     assert not faces_away(seen.assembly, seen.start, there).any()

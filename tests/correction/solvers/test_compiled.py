@@ -15,13 +15,13 @@ from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
 from apo_bench.correction.solvers.linear_step import DenseStep
 from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry import Array, pose
 from tests.correction.test_many import check_same
 
-by_kernels = partial(nearest_goals, kernels=kernels.kernels())
+by_kernels = partial(nearest_poses, kernels=kernels.kernels())
 SCENARIOS = ("stick_on_castles", "vanished_fixture", "pocket_table")
 LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
 """Noise in mm and degrees, and how far goals may differ, [m]. At the larger one rounding grows on the way: the plain
@@ -39,13 +39,13 @@ def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[CompactEquat
     return compact_equations(equations(given.assembly, given.start, goals), len(goals)), goals, L
 
 
-def alike(expected: NearestGoals, actual: NearestGoals, within_m: float) -> None:
+def alike(expected: NearestPoses, actual: NearestPoses, within_m: float) -> None:
     assert len(expected.trace) == len(actual.trace)
     assert np.array_equal(expected.at_rest, actual.at_rest)
     assert np.array_equal(expected.finite, actual.finite)
-    for name in ("goals", "z", "e", "Jt", "B", "at_rest", "finite"):
+    for name in ("poses", "z", "e", "Jt", "B", "at_rest", "finite"):
         assert getattr(expected, name).shape == getattr(actual, name).shape
-    np.testing.assert_allclose(actual.goals, expected.goals, rtol=0, atol=within_m)
+    np.testing.assert_allclose(actual.poses, expected.poses, rtol=0, atol=within_m)
     np.testing.assert_allclose(actual.e, expected.e, rtol=0, atol=within_m)
     np.testing.assert_allclose(actual.B, expected.B, rtol=0, atol=1e2 * within_m)
     np.testing.assert_allclose(actual.Jt, expected.Jt, rtol=0, atol=1e2 * within_m)
@@ -61,7 +61,7 @@ def _numba() -> None:
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
     for seed in range(3):
         given = drawn(name, *level, seed)
-        alike(nearest_goals(*given), by_kernels(*given), LEVELS[level])
+        alike(nearest_poses(*given), by_kernels(*given), LEVELS[level])
 
 
 @pytest.mark.numeric
@@ -72,9 +72,9 @@ def test_what_is_not_finite_is_said_and_left_alone() -> None:
     with np.errstate(invalid="ignore"):
         found = by_kernels(system, three, np.array([L, L, L]))
     assert found.finite.tolist() == [True, False, True]
-    assert np.array_equal(found.goals[1], three[1], equal_nan=True)
+    assert np.array_equal(found.poses[1], three[1], equal_nan=True)
     assert not found.z[1].any()
-    assert np.array_equal(found.goals[0], by_kernels(system, goals, L).goals)
+    assert np.array_equal(found.poses[0], by_kernels(system, goals, L).poses)
 
 
 def observed(name: str, mm: float, degrees: float, seed: int, play_m: float = 0.0) -> Observation:

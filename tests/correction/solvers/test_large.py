@@ -13,7 +13,7 @@ from apo_bench import Assembly, correct
 from apo_bench.assembly import Operation
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses, solve_batch
 from apo_bench.geometry import Array
 from benchmarks.corrector_problems import problem
 from tests import scenes
@@ -78,18 +78,18 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     return str(request.param)
 
 
-def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
-    return batch_goals(system, seen[None], L[None], soft_m, sparse=True).at(0)
+def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None = None) -> NearestPoses:
+    return solve_batch(system, seen[None], L[None], soft_m, sparse=True).at(0)
 
 
 @pytest.mark.parametrize("name", SMALL)
 def test_sparse_is_dense(name: str, way: str) -> None:
     system, seen, L = drawn(name)
     large = nearest_goals_sparse(system, seen, L)
-    small = nearest_goals(system, seen[None], L)
+    small = nearest_poses(system, seen[None], L)
     assert large.at_rest
     assert small.at_rest.all()
-    assert_allclose(large.goals, small.goals[0], rtol=0, atol=1e-9)
+    assert_allclose(large.poses, small.poses[0], rtol=0, atol=1e-9)
     assert_allclose(large.z, small.z[0], rtol=0, atol=1e-6)
     assert_allclose(large.Jt.toarray(), small.Jt[0], rtol=0, atol=1e-8)
     assert_allclose(large.B, small.B[0], rtol=0, atol=1e-9)
@@ -102,7 +102,7 @@ def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeyp
     monkeypatch.setattr(sparse, "FEW", few)
     for seed in range(2):
         system, seen, L = drawn(name, seed)
-        Jt = nearest_goals(system, seen[None], L).Jt[0]
+        Jt = nearest_poses(system, seen[None], L).Jt[0]
         assert sparse.sparse_rank(csr_array(Jt)) == posterior.jacobian_rank(Jt) == SMALL[name][1]
 
 
@@ -110,7 +110,7 @@ def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeyp
 def test_what_a_sparse_matrix_leaves_free_is_what_its_singular_vectors_say(name: str) -> None:
     """Both are off by rounding over the smallest singular value: the largest difference seen was 2e-12."""
     system, seen, L = drawn(name)
-    Jt = nearest_goals(system, seen[None], L).Jt[0]
+    Jt = nearest_poses(system, seen[None], L).Jt[0]
     free = sparse.free_basis(csr_array(Jt), *posterior.UNCLEAR)
     assert free is not None
     known = posterior.freedom_of(Jt)
@@ -124,7 +124,7 @@ def test_a_thousand_blocks_on_one_plate() -> None:
     scene = hub(n)
     L = scales(n, 0.5, 0.02)
     seen = twisted(scene.goals, L, np.random.default_rng(0))
-    found = nearest_goals(system_of(scene, seen), seen, L)
+    found = nearest_poses(system_of(scene, seen), seen, L)
     assert found.at_rest
     assert np.abs(found.e).max() <= 1e-9
     assert posterior.jacobian_rank(found.Jt) == 3 * n

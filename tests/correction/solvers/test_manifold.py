@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.geometry import Array, pose
 from tests import scenes
@@ -44,9 +44,9 @@ def correction(seen: Array, goals: Array, L: Array) -> Array:
     return np.asarray(np.linalg.solve(L, pose.log(pose.inverse(seen) @ goals)[..., None]).reshape(-1))
 
 
-def jacobian(system: CompactEquations, found: NearestGoals) -> Array:
+def jacobian(system: CompactEquations, found: NearestPoses) -> Array:
     """The derivative of e by z where the solver ended, (3 c, 6 n)."""
-    return np.asarray(system.gathered(system.blocks(found.goals, found.B)[1]).T)
+    return np.asarray(system.gathered(system.blocks(found.poses, found.B)[1]).T)
 
 
 def drift(J: Array, z: Array, directions: int) -> float:
@@ -65,14 +65,14 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
         L = crooked(n, rng) if seed % 2 else scales(n, *level)
         seen = twisted(scene.goals, L, rng)
         system = system_of(scene, seen)
-        found = nearest_goals(system, seen, L)
+        found = nearest_poses(system, seen, L)
         assert found.at_rest
         assert found.finite
-        assert np.abs(equations(scene.assembly, scene.start, seen).residual(found.goals)).max() <= 1e-12
+        assert np.abs(equations(scene.assembly, scene.start, seen).residual(found.poses)).max() <= 1e-12
         J = jacobian(system, found)
         assert jacobian_rank(J.T) == jacobian_rank(found.Jt) == RANKS[name]
         assert drift(J, found.z, RANKS[name]) <= 1e-6
-        assert_allclose(found.goals, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
+        assert_allclose(found.poses, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
         truth = correction(seen, scene.goals, L)
         assert found.z @ found.z <= truth @ truth + 1e-9
 
@@ -84,7 +84,7 @@ def test_the_derivative_is_one() -> None:
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest_goals(system, seen, L)
+    found = nearest_poses(system, seen, L)
     by = 1e-4
     e = [
         [system.residual(seen @ pose.exp((L @ (found.z + sign * step).reshape(3, 6, 1))[..., 0])) for sign in (1, -1)]
@@ -108,7 +108,7 @@ def test_ever_stiffer_springs_lead_to_the_same() -> None:
     z = np.zeros(18)
     for soft_m in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
         z = least_squares(pulls, z, args=(soft_m,), xtol=1e-15, ftol=1e-15, gtol=1e-12).x
-    found = nearest_goals(system_of(scene, seen), seen, L)
+    found = nearest_poses(system_of(scene, seen), seen, L)
     assert found.z @ found.z == pytest.approx(z @ z, rel=1e-5)
     assert_allclose(found.z, z, rtol=0, atol=1e-3)
 
@@ -125,7 +125,7 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
         system = system_of(scene, seen)
         hard = np.repeat(rng.random(len(system)) < demanded, 3)
         soft_m = np.where(hard, 0.0, rng.uniform(0.1e-3, 2e-3, len(hard)))
-        found = nearest_goals(system, seen, L, soft_m)
+        found = nearest_poses(system, seen, L, soft_m)
         assert found.at_rest
         assert np.abs(found.e[hard]).max(initial=0.0) <= 1e-11
         assert np.abs(found.e[~hard]).max() > 1e-6

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.gauss_newton import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_poses
 from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settled_basis
 from apo_bench.geometry import Array, pose
 from tests import scenes
@@ -35,7 +35,7 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     L = crooked(len(scene.goals), rng, 5.0, 3.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest_goals(system, seen, L)
+    found = nearest_poses(system, seen, L)
     known = freedom_of(found.Jt)
     assert known is not None
     assert known.rank == jacobian_rank(found.Jt) == RANKS[name]

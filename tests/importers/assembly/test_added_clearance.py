@@ -14,9 +14,7 @@ from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import scenario_text, write_scenario
 from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.fit import with_fit
-from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft
 from tests.importers.assembly.test_blocked import FLOOR, made
 
 SLOTTED = join(FLOOR, *(extrude(rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
@@ -61,11 +59,6 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
     assert add_clearance(parts, clearance, most) == (parts, ())
 
 
-def test_what_has_play_keeps_its_size(tmp_path: Path) -> None:
-    parts = slotted(tmp_path, 19.8)
-    assert add_clearance(parts, 0.25) == (parts, ())
-
-
 @pytest.mark.parametrize("over", [0.0, 0.05])
 def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
     plate = extrude(rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
@@ -74,14 +67,6 @@ def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over
     assert pin.fit == {"pin": pytest.approx(over, abs=1e-5)}
     assert pin.solid.rounds["pin"].radius == pytest.approx(4e-3, abs=1e-8)
     assert intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
-
-
-def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
-    write_part("leaf", extrude(rectangle(0.4, 30), 0, 35), tmp_path, density=700, source="a test", licence="CC0-1.0")
-    solid = load_part(tmp_path / "leaf.xml")
-    sides = {name: 0.25 for name, face in solid.faces.items() if abs(face.normal[0]) > 0.9}
-    with pytest.raises(InputError, match="leaves less than"):
-        with_fit(solid, sides)
 
 
 @pytest.mark.parametrize(

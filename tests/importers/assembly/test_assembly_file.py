@@ -72,5 +72,5 @@ def test_a_hole_away_from_the_middle_does_not_draw_the_frame_to_it(tmp_path: Pat
 
 
 def test_a_cavity_is_no_solid(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds one solid"):
+    with pytest.raises(InputError, match="the file holds one solid"):
         import_assembly([stl(tmp_path, block(40, 40, 40) - block(20, 20, 20, (0, 0, 10)))], tmp_path / "parts")

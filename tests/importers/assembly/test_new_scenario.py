@@ -10,10 +10,8 @@ import pytest
 from apo_bench import InputError, Scenario, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
-from apo_bench.importers.assembly.checking import line_of
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
-from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.importers.assembly.touching import find_clashes
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts import load_part
@@ -185,27 +183,6 @@ def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on base"):
         new_scenario(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
-
-
-def test_what_stands_and_what_rolls(tmp_path: Path) -> None:
-    write_part("pin", PIN, tmp_path, density=700, source="a test", licence="CC0-1.0")
-    pin = load_part(tmp_path / "pin.xml")
-    assert find_stance(pin, np.eye(3)) == (0.0, True, False)
-    lies = find_stance(pin, pose.at(np.zeros(3), (90, 0, 0))[:3, :3])
-    assert lies.rolls
-    assert lies.height_m == pytest.approx(0.004, abs=1e-6)
-    assert not find_stance(pin, pose.at(np.zeros(3), (30, 0, 0))[:3, :3]).stands
-
-
-def test_lines_of_keys_are_found() -> None:
-    text = (
-        'schema = 1\n[parts.a]\nfile = "a"\nstart = 1\n[[operations]]\nmove = "a"\n[[operations]]\ngrasp = 2\n[site]\n'
-    )
-    assert line_of(text, "parts, a, start: it falls") == 4
-    assert line_of(text, "operation 2, grasp: too wide") == 8
-    assert line_of(text, "operation 1, goal: far") == 5
-    assert line_of(text, "site: too far") == 9
-    assert line_of(text, "operation 3, goal: none") is None
 
 
 def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from apo_bench import InputError
 from apo_bench.geometry import Box, Cylinder, Solid, cylinder_hull, pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
-from apo_bench.importers.assembly.staging import Stance, choose_site, find_stance, stage_parts
+from apo_bench.importers.assembly.staging import Stance, find_stance, stage_parts
 from apo_bench.importers.assembly.writing import scenario_text
 from apo_bench.scenario.parts.making import extrude, rectangle, shaft
 from tests.importers.assembly.test_new_scenario import at, made
@@ -35,29 +35,10 @@ def test_parts_wait_in_reach_with_room_for_fingers_and_clear_of_the_site() -> No
         assert np.hypot(*corner) > 0.12 + 0.03 - 1e-9
 
 
-def test_the_largest_part_waits_first_nearest_to_where_parts_are_liked() -> None:
-    solids = {"small": brick(0.01, 0.01, 0.01), "large": brick(0.03, 0.03, 0.01)}
-    places = stage_parts(solids, dict.fromkeys(solids, np.eye(3)), [])
-    liked = {name: np.hypot(at_m[0] - 0.05, abs(at_m[1]) - 0.27) for name, at_m in places.items()}
-    assert liked["large"] < 0.01
-    assert liked["large"] <= liked["small"]
-
-
 def test_more_than_the_table_holds_is_refused() -> None:
     solids = {f"p{k}": brick(0.08, 0.08, 0.01) for k in range(12)}
     with pytest.raises(InputError, match="no room for 12 parts to wait on the table"):
         stage_parts(solids, dict.fromkeys(solids, np.eye(3)), [])
-
-
-def test_a_small_assembly_is_moved_far_and_a_large_one_hardly() -> None:
-    small = choose_site(0.03, False)
-    assert small.spread_m == (0.04, 0.06)
-    assert np.degrees(small.yaw_rad) == pytest.approx((-28.0, 28.0))
-    assert choose_site(0.20, False).spread_m == (0.005, 0.005)
-    assert choose_site(0.11, False).spread_m == (0.02, 0.05)
-    beside = choose_site(0.03, True)
-    assert beside.spread_m == (0.01, 0.02)
-    assert np.degrees(beside.yaw_rad) == pytest.approx((-8.0, 8.0))
 
 
 def test_what_is_heavy_beside_its_foot_does_not_stand() -> None:
@@ -131,11 +112,3 @@ def test_a_file_of_poses_that_makes_no_assembly_is_refused(text: str, sentence: 
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
         read_posed(path, ["block"] if '"block"' in text else [])
-
-
-def test_a_part_without_a_pose_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "poses.toml"
-    path.write_text(2 * '[[pose]]\npart = "block"\nat_mm = [0, 0, 0]\n')
-    assert [each.name for each in read_posed(path, ["block"])] == ["block", "block_2"]
-    with pytest.raises(InputError, match="stick has no pose"):
-        read_posed(path, ["block", "stick"])

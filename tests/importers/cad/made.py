@@ -102,21 +102,12 @@ def area(corners: list[tuple[float, float]]) -> float:
 
 MADE: Mapping[str, Callable[[], Made]] = {
     "cuboid": lambda: Made(block(30, 20, 10), 6000, 6),
-    "turned_cuboid": lambda: turned(Made(block(30, 20, 10), 6000, 6), 20, 30, 40),
-    "plate": lambda: holed((60, 40, 20), (5, -3, 5.1)),
     "turned_plate": lambda: turned(holed((60, 40, 20), (5, -3, 5.1)), 10, 50, 70),
-    "four_holes": lambda: holed((60, 60, 8), (20, 20, 2.1), (-20, 20, 2.1), (-20, -20, 3.2), (20, -20, 4.25)),
     "tiny_hole": lambda: holed((20, 20, 5), (3, 4, 0.5)),
-    "wide_hole": lambda: holed((120, 120, 10), (0, 0, 45.0)),
-    "two_near": lambda: holed((40, 20, 10), (-4.5, 0, 4.0), (4.5, 0, 4.0)),
-    "pin": lambda: Made(rod(5, 40, n=48), disc(5, 40), 2, shafts=(5,)),
     "turned_pin": lambda: turned(Made(rod(4, 30, n=32), disc(4, 30), 2, shafts=(4,)), 33, 44, 55),
-    "disc": lambda: Made(rod(25, 4, n=96), disc(25, 4), 2, shafts=(25,)),
-    "stepped_shaft": lambda: Made(rod(8, 10) + rod(5, 20, (0, 0, 10)), disc(8, 10) + disc(5, 20), 3, shafts=(5, 8)),
     "chamfered_pin": lambda: Made(
         rod(4, 20) + rod(4, 1, (0, 0, 20), 3), disc(4, 20) + frustum(4, 3, 1), 2, shafts=(4,), cones=1
     ),
-    "truncated_cone": lambda: Made(rod(10, 20, top=5), frustum(10, 5, 20), 2, cones=1),
     "cone": lambda: Made(rod(10, 20, top=0), frustum(10, 0, 20), 1, cones=1),
     "bush": lambda: Made(rod(9, 20) - rod(5, 20), disc(9, 20) - disc(5, 20), 2, (5,), (9,)),
     "flanged_bush": lambda: Made(
@@ -132,18 +123,6 @@ MADE: Mapping[str, Callable[[], Made]] = {
         (4,),
         cones=1,
     ),
-    "blind": lambda: Made(
-        block(80, 30, 20) - rod(4.05, 12, (-20, 0, 8)) - rod(4.05, 12, (20, 0, 8)),
-        48000 - 2 * disc(4.05, 12),
-        8,
-        (4.05, 4.05),
-    ),
-    "pins": lambda: Made(
-        block(60, 40, 10) + rod(4, 15, (15, 0, 10)) + rod(3, 12, (-15, 0, 10)),
-        24000 + disc(4, 15) + disc(3, 12),
-        8,
-        shafts=(3, 4),
-    ),
     "bracket": lambda: Made(
         block(60, 40, 10)
         + block(10, 40, 40, (-25, 0, 10))
@@ -153,23 +132,10 @@ MADE: Mapping[str, Callable[[], Made]] = {
         8,
         (4, 4.2),
     ),
-    "l_profile": lambda: Made(prism(L_SHAPE, 20), area(L_SHAPE) * 20, 8),
-    "u_profile": lambda: Made(prism(U_SHAPE, 25), area(U_SHAPE) * 25, 10),
-    "t_profile": lambda: turned(Made(prism(T_SHAPE, 15), abs(area(T_SHAPE)) * 15, 10), 15, 25, 35),
     "dovetail": lambda: Made(prism(DOVETAIL, 30), area(DOVETAIL) * 30, 10),
     "pocket": lambda: Made(block(50, 40, 20) - block(20, 16, 12, (0, 0, 8)), 40000 - 20 * 16 * 12, 11),
     "hexagon": lambda: Made(rod(10, 8, n=6) - rod(5, 8), 1.5 * 3**0.5 * 100 * 8 - disc(5, 8), 8, (5,)),
-    "wedge": lambda: Made(prism([(0, 0), (40, 0), (0, 20)], 25), 10000, 5),
     "rounded_plate": rounded_plate,
-    "two_sides": lambda: Made(
-        block(30, 30, 30) - rod(4, 12, (0, 0, 18)) - rod(3, 10).rotate((0, 90, 0)).translate((-15, 0, 8)),
-        27000 - disc(4, 12) - disc(3, 10),
-        8,
-        (3, 4),
-    ),
-    "steps": lambda: Made(
-        block(30, 20, 10) + block(20, 20, 10, (-5, 0, 10)) + block(10, 20, 10, (-10, 0, 20)), 12000, 10
-    ),
 }
 
 

@@ -7,35 +7,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from apo_bench import InputError
 from apo_bench.geometry import Face
 from apo_bench.importers.cad.faces.fitting import Round
 from apo_bench.importers.cad.importing import _fault, import_part, raw_solids
-from apo_bench.importers.cad.part_report import file_lines, part_lines, report_part
-from apo_bench.importers.cad.pieces.corners import corners_of, without_near
 from apo_bench.importers.cad.step.from_brep import raw_of
-from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall
+from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.scenario.parts import load_part
-from tests.importers.cad.made import block, disc, prism, rod, write_stl, write_triangles
+from tests.importers.cad.made import block, prism, rod, write_stl, write_triangles
 
 
 def triangles(mesh: Any) -> Any:
     raw = mesh.to_mesh()
     return np.asarray(raw.vert_properties)[:, :3][np.asarray(raw.tri_verts)]
-
-
-def test_the_earlier_one_of_two_near_corners_stays() -> None:
-    points = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 1e-4], [5.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(without_near(points), points[[0, 1, 3]])
-
-
-def test_corners_of_a_body_have_all_their_digits() -> None:
-    corners = corners_of(Manifold.cube((0.1, 0.2, 0.3)))
-    expected = np.array(np.meshgrid([0.0, 0.1], [0.0, 0.2], [0.0, 0.3])).reshape(3, -1).T
-    np.testing.assert_allclose(sorted(corners.tolist()), sorted(expected.tolist()), rtol=0.0, atol=1e-12)
 
 
 def test_a_face_whose_hole_crosses_its_border_is_no_face() -> None:
@@ -74,8 +60,8 @@ def as_brep(body: Any) -> BrepSolid:
     wall = (np.abs(reach - 5.0) < 0.01) & (np.abs(normals[:, 2]) < 0.1)
     index = np.arange(3 * len(corners)).reshape(-1, 3)
     z = np.array([0.0, 0.0, 1.0])
-    round_face = BrepFace(Wall(Round(np.zeros(3), z, 5.0, 0.0), 0.0), corners[wall].reshape(-1, 3), index[: wall.sum()])
-    flat = [BrepFace(Flat(p[0], -n, 0.0), p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
+    round_face = BrepFace(Round(np.zeros(3), z, 5.0, 0.0), 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()])
+    flat = [BrepFace(Plane(p[0], -n), 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
     return BrepSolid("a", (round_face, *flat), ())
 
 
@@ -98,16 +84,6 @@ def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bo
     assert top.point[2] == pytest.approx(20.0)
 
 
-def test_half_a_wall_of_a_step_file_stays_half(tmp_path: Path) -> None:
-    body = rod(5.0, 20.0) - block(20, 10, 30, (0, -5, -5))
-    raw = raw_of(tmp_path / "a.step", as_brep(body))
-    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
-    (wall,) = (region for region in raw.regions if region.is_round)
-    assert wall.turn == pytest.approx(np.pi, abs=1e-3)
-    assert not wall.is_whole
-    assert wall.name == ""
-
-
 def test_a_window_in_a_wall_of_a_step_file_stays_open(tmp_path: Path) -> None:
     body = rod(5.0, 20.0) - block(6, 4, 4, (5, 0, 8))
     raw = raw_of(tmp_path / "a.step", as_brep(body))
@@ -124,28 +100,6 @@ def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_pa
     assert dict(part.refused) == {}
     volume = sum(ConvexHull(1e3 * piece.corners).volume for piece in part.solid.pieces)
     assert volume == pytest.approx(1e9 * part.solid.volume, rel=2e-3)
-
-
-def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> None:
-    mesh = block(40, 30, 20) - rod(4, 12, (5, 0, 8), n=48)
-    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    part = import_part(raw, "a", tmp_path, "a.stl")
-    assert part.free_mm["hole1"] == pytest.approx(4.0, abs=0.01)
-    assert 1e9 * part.solid.volume == pytest.approx(24000.0 - disc(4, 12), rel=1e-5)
-
-
-def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
-    path = write_stl(block(40.125, 30, 10) - rod(4, 10, n=32), tmp_path / "lid.stl")
-    file, (raw,) = raw_solids(path, None)
-    assert list(file_lines(file, path)) == [f"{path}: unit mm, taken from the size; the file states none"]
-    assert raw_solids(path, "mm")[0][:2] == ("mm", "as asked")
-    lines = list(part_lines(report_part(import_part(raw, "lid", tmp_path, "lid.stl"))))
-    assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")
-    assert "    px: flat, normal (1, 0, 0), 20.0625 mm from the origin" in lines
-    assert any(
-        line.startswith("    hole1: hole, cylinder of 32 sides, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
-        for line in lines
-    )
 
 
 def test_a_part_that_is_too_light_is_refused(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from apo_bench import InputError
-from apo_bench.geometry import Hull
 from apo_bench.importers.cad.importing import import_part, raw_solids
 from apo_bench.importers.cad.pieces import cutting
 from tests.importers.cad.made import block, rod, write_stl
@@ -60,20 +58,6 @@ def test_beside_others_many_holes_are_filled_that_nothing_comes_into(
     into_all = np.array([[10.0 * k, 0.3, 2.0] for k in range(6)])
     assert not cutting.cut(raw, into_all).filled
     assert not cutting.cut(raw).filled
-
-
-def test_crumbs_that_hang_on_nothing_are_left_out() -> None:
-    def cube(x: float, half: float) -> Hull:
-        return Hull("", np.array(list(product((x - half, x + half), *[(-half, half)] * 2))))
-
-    near, far, crumb = cube(0.0, 0.01), cube(0.0205, 0.01), cube(0.05, 0.0005)
-    kept, lost, is_one = cutting._drop_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
-    assert len(kept) == 2
-    assert lost == 1
-    assert is_one
-    # What is more is no crumb: it stays, and is refused with the part.
-    assert cutting._drop_crumbs([near, far], 2.0) == ([near, far], 0, False)
-    assert cutting._drop_crumbs([near], 2.0) == ([near], 0, True)
 
 
 def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_reason(

@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
-from scipy.spatial import ConvexHull
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.assembled import coming_near, surface_points
 from apo_bench.importers.cad.faces.regions import find_regions
-from apo_bench.importers.cad.pieces import refining
-from apo_bench.importers.cad.pieces.cut_part import CutPart
 from apo_bench.importers.cad.pieces.cutting import cut
 from apo_bench.importers.cad.pieces.refining import depths
 from apo_bench.importers.cad.solids.bodies import mesh_of
@@ -72,14 +69,3 @@ def test_others_are_followed_along_ways_that_are_free() -> None:
     assert of_plate[:, 2].max() > 19.0
     assert np.hypot(*of_plate[:, :2].T).max() < 5.6
     assert len(of_pin)
-
-
-def test_hulls_are_not_trimmed_where_that_takes_them_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    def shrunk(part: CutPart, _: object) -> CutPart:
-        middle = np.array(part.body.bounding_box()).reshape(2, 3).mean(axis=0)
-        return part._replace(body=part.body.translate(-middle).scale((0.9, 0.9, 0.9)).translate(middle))
-
-    monkeypatch.setattr(refining, "_within", shrunk)
-    body = block(40, 40, 4) + block(20, 20, 9)
-    pieces = cut(raw_of("a", body)).pieces
-    assert sum(ConvexHull(1e3 * piece.corners).volume for piece in pieces) == pytest.approx(body.volume(), rel=1e-4)

@@ -66,18 +66,6 @@ def test_what_is_no_part_is_refused_in_one_sentence(
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_normals_of_a_text_stl_are_not_needed(tmp_path: Path) -> None:
-    facets = "".join(
-        "facet normal ten 0 0\nouter loop\n"
-        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in each)
-        + "endloop\nendfacet\n"
-        for each in triangles(block(20, 20, 20))
-    )
-    (tmp_path / "a.stl").write_text(f"solid a\n{facets}endsolid a\n")
-    _, (raw,) = raw_solids(tmp_path / "a.stl", None)
-    assert raw.mesh.volume == pytest.approx(8000.0)
-
-
 @pytest.mark.parametrize(("scale", "unit"), [(0.1 / 30, "mm"), (0.1, "m")])
 def test_what_is_too_small_or_too_large_for_a_part_is_refused(scale: float, unit: str, tmp_path: Path) -> None:
     path = write_stl(block(30, 30, 30), tmp_path / "a.stl", scale)
@@ -143,12 +131,6 @@ def test_what_pieces_leave_out_is_no_matter_of_the_part_up_to_a_hundredth(
         import_part(raw, "a", tmp_path, "a.stl")
 
 
-def test_units_are_as_asked(tmp_path: Path) -> None:
-    path = write_stl(block(2, 1, 1), tmp_path / "a.stl")
-    _, (raw,) = raw_solids(path, "in")
-    assert raw.mesh.extent == pytest.approx(50.8)
-
-
 def test_inside_out_is_turned_and_said(tmp_path: Path) -> None:
     path = write_triangles(triangles(block(20, 20, 20) - rod(4, 20))[:, ::-1], tmp_path / "a.stl")
     _, (raw,) = raw_solids(path, None)
@@ -161,17 +143,6 @@ def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
     given[::3] = given[::3, ::-1]
     with pytest.raises(InputError, match="neighbouring triangles face different ways"):
         raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
-
-
-def test_solids_of_one_shape_are_one_part_with_places(tmp_path: Path) -> None:
-    a = block(30, 20, 10)
-    b = block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
-    path = write_triangles(
-        np.concatenate([triangles(each) for each in (a, b, rod(5, 20, (0, 60, 0)))]), tmp_path / "a.stl"
-    )
-    _, raws = raw_solids(path, None)
-    assert [len(raw.places) for raw in raws] == [2, 1]
-    assert raws[0].places[1].T[:3, 3] == pytest.approx([50, 0, 0], abs=1e-4)
 
 
 def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:

@@ -102,11 +102,6 @@ def test_a_cone_stays_a_cone_also_if_it_was_subdivided(name: str, is_fine: bool)
     assert cones == pytest.approx(np.array(radii), abs=0.02)
 
 
-def test_ten_sides_are_flat_faces() -> None:
-    for body, flats in ((rod(10, 20, n=10), 12), (block(40, 40, 12) - rod(10, 12, n=10), 16)):
-        assert Counter(region.kind for region in found(body)) == {"plane": flats}
-
-
 def test_sides_that_one_end_has_more_of_are_one_wall() -> None:
     """Corners of both ends at other angles: triangles of uneven width, all of whose corners lie on one circle."""
     low, high = (2.0 * np.pi * np.arange(n) / n for n in (48, 31))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -95,12 +94,6 @@ def test_the_identity_among_other_poses_is_a_lost_frame(tmp_path: Path) -> None:
     assert len(read_log(log, "csv", Conventions()).tracks["a"].t) == 1
 
 
-def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(" T_S , Id,X_MM,y_mm, Z_mm,QW,Qx,qy,qz\n" + ROW, encoding="utf-8")
-    track = read_log(tmp_path / "log.csv", "csv", Conventions()).tracks["a"]
-    assert np.allclose(track.T[0, :3, 3], [0.0, 0.0, 0.9])
-
-
 @pytest.mark.parametrize(
     ("stated", "sentence"),
     [
@@ -113,12 +106,6 @@ def test_a_column_that_does_not_exist_is_named(stated: dict[str, str], sentence:
     with pytest.raises(InputError) as error:
         read_log(tmp_path / "log.csv", "csv", Conventions(columns=stated))
     assert sentence in str(error.value)
-
-
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "log.csv")
-    with pytest.raises(InputError, match="a pipe was given; give a"):
-        read_log(tmp_path / "log.csv", "csv", Conventions())
 
 
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,11 +148,3 @@ def test_rows_without_a_time_are_counted_by_the_rate_of_images(sorted_by_id: boo
         assert log.tracks[name].t == pytest.approx([0.0, 0.1, 0.2])
     with pytest.raises(InputError, match="or state `rate_hz` there"):
         read_log(tmp_path / "log.csv", "csv", Conventions())
-
-
-def test_an_id_that_is_missing_in_an_image_leaves_the_others_in_time(tmp_path: Path) -> None:
-    rows = "".join(f"{name},0,0,900,1,0,0,0\n" for name in "abbabab")
-    (tmp_path / "log.csv").write_text("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n" + rows, encoding="utf-8")
-    log = read_log(tmp_path / "log.csv", "csv", Conventions(rate_hz=1.0))
-    assert log.tracks["a"].t.tolist() == [0.0, 1.0, 2.0]
-    assert log.tracks["b"].t.tolist() == [0.0, 1.0, 2.0, 3.0]

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, Observation, correct, detect_contacts, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Facing, Operation, placements
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, slack

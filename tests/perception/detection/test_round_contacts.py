@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import detect_contacts
 from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Face, RoundFace, pose
 from apo_bench.perception.detection.thresholds import Rules, pair_thresholds, reality, slack
 from tests import rounds, scenes

@@ -44,30 +44,27 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """
     points = np.round(without_near(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
-    hull = Hull("", 1e-3 * corners)
     # Sides of a hull that differ by rounding are one; a corner between two such sides is then inside of the piece.
     for _ in range(4):
+        hull = Hull("", 1e-3 * corners)
         inside = (hull.planes[:, 3] - hull.corners @ hull.planes[:, :3].T).min(axis=1) > _INSIDE_M
         if not inside.any():
             break
         corners = corners[~inside]
-        hull = Hull("", 1e-3 * corners)
-    if _is_simple(hull):
-        return np.asarray(corners)
-    return reduced(corners, flats, cuts)
+    return np.asarray(corners) if _is_simple(corners) else reduce_corners(corners, flats, cuts)
 
 
-def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
-    """The corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
+def reduce_corners(corners: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+    """Return the corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
     corners = corners[np.sort(ConvexHull(corners).vertices)]
-    if _is_simple(Hull("", 1e-3 * corners)):
+    if _is_simple(corners):
         return np.asarray(corners)
     for many in _IN_PLANE:
-        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners, _FEWEST))
+        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners))
         best = corners[kept]
-        if _is_simple(Hull("", 1e-3 * best)):
+        if _is_simple(best):
             break
-    while _is_simple(Hull("", 1e-3 * corners[kept])):
+    while _is_simple(corners[kept]):
         best = corners[kept]
         planes = ConvexHull(best).equations
         off = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
@@ -77,10 +74,9 @@ def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
     return np.asarray(best)
 
 
-def _is_simple(hull: Hull) -> bool:
-    return (
-        len(hull.corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
-    )
+def _is_simple(corners: Array) -> bool:
+    hull = Hull("", 1e-3 * corners)
+    return len(corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
 
 
 def _on_flats(corners: Array, flats: Array, many: int) -> Any:
@@ -96,13 +92,11 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
     return np.unique(np.concatenate(kept))
 
 
-def _farthest(corners: Array, many: int) -> Any:
-    """Those that are farthest in so many directions in space, and along the axes of the frame; none in none."""
-    if not many:
-        return np.zeros(0, dtype=np.intp)
+def _farthest(corners: Array) -> Any:
+    """The farthest corners in some directions in space, and along the axes of the frame."""
     # Evenly spread directions: equal steps of height, turned by the golden angle from one to the next.
-    k = np.arange(many) + 0.5
-    up = 1.0 - 2.0 * k / many
+    k = np.arange(_FEWEST) + 0.5
+    up = 1.0 - 2.0 * k / _FEWEST
     turn = np.pi * (1.0 + 5.0**0.5) * k
     flat = np.sqrt(1.0 - up**2)
     way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])

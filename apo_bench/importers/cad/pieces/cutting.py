@@ -49,13 +49,6 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
-    trimmed, is_one = _cut(raw, others, True)
-    # The material that is trimmed off hulls may be all that connects two of them.
-    return trimmed if is_one else _cut(raw, others, False)[0]
-
-
-def _cut(raw: RawSolid, others: Array | None, trims: bool) -> tuple[Cut, bool]:
-    """Return the pieces, and whether all of them are connected."""
     body = body_of(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
@@ -69,7 +62,7 @@ def _cut(raw: RawSolid, others: Array | None, trims: bool) -> tuple[Cut, bool]:
         body = body.simplify(min(1e-3 * size, 0.01))
     hulls = 0
     outlines: list[Array] = []
-    beside = Beside(size, flats, None if others is None else cKDTree(others), trims)
+    beside = Beside(size, flats, None if others is None else cKDTree(others))
     for part in cut_at_shoulders(convex_parts(body, beside), shafts, size):
         coarse = without_near(snap_to_planes(corners_of(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):
@@ -94,24 +87,24 @@ def _cut(raw: RawSolid, others: Array | None, trims: bool) -> tuple[Cut, bool]:
             f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
             "out fillets and free surfaces."
         )
-    whole, lost, is_one = _drop_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
-    return Cut(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept)), is_one
+    whole, lost = _drop_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
+    return Cut(tuple(whole), hulls + lost, tuple(bore.name for bore in bores if bore not in kept))
 
 
-def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int, bool]:
+def _drop_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], int]:
     """Drop groups of pieces of little volume that touch no others.
 
     Args:
         most: Of the volume of a group, [mm^3].
 
     Returns:
-        The other pieces, how many groups were dropped, and whether the others are connected.
+        The other pieces, and how many groups were dropped.
     """
     loose = sorted(touching_groups(pieces), key=len)[:-1]
     volumes = [sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group) for group in loose]
     crumbs = [group for group, volume in zip(loose, volumes, strict=True) if volume < most]
     dropped = set[int]().union(*crumbs)
-    return [piece for k, piece in enumerate(pieces) if k not in dropped], len(crumbs), len(crumbs) == len(loose)
+    return [piece for k, piece in enumerate(pieces) if k not in dropped], len(crumbs)
 
 
 def _bore(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:

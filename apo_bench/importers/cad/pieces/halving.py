@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.pieces.refining import Beside, refined
+from apo_bench.importers.cad.pieces.refining import Beside, refine
 from apo_bench.importers.cad.solids.bodies import mesh_of
 from apo_bench.importers.cad.solids.region import Region
 
@@ -26,7 +26,7 @@ larger; they need not have more triangles."""
 def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
     """Parts that are convex, or that stand for a hollow free shape with their hull."""
     volume = solid.volume()
-    yield from refined(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
+    yield from refine(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
 
 
 def _parts(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:

@@ -1,4 +1,4 @@
-"""Solids of a B-rep become closed meshes whose triangles belong to faces with the parameters of the file."""
+"""A solid of a B-rep becomes a closed mesh whose triangles belong to faces with the parameters of the file."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,36 +16,36 @@ from apo_bench.importers.cad.solids.mesh import Mesh, connected, put_together
 from apo_bench.importers.cad.solids.naming import name_regions
 from apo_bench.importers.cad.solids.raw_solid import RawSolid
 from apo_bench.importers.cad.solids.region import Region
-from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same
+from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane, is_same_surface
 
 _LEVEL = 1e-6
 """Corners of an end are level within this part of the size."""
 
 
 def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
-    """A solid with its faces, in its own frame.
+    """Return a solid with its faces, in its own frame.
 
     Raises:
         InputError: A face of it could not be cut into triangles, or its shell is open.
     """
-    is_whole = all(len(face.triangles) for face in solid.faces)
-    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; correct it where it was drawn.")
-    mesh, owner = _mesh(solid.faces)
+    faces = solid.faces
+    is_whole = all(len(face.triangles) for face in faces)
+    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; repair it in its CAD program.")
+    mesh, owner = _mesh(faces)
     check_closed(path, mesh)
-    surfaces = [face.surface for face in solid.faces]
     repairs = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
     mesh = mesh.flip() if repairs else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
-    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
-    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
-    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))
-    mesh, owner = _in_strips(mesh, group[owner], [surfaces[int(k)] for k in np.unique(group, return_index=True)[1]])
+    neighbours = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
+    pairs = [(i, k) for i, k in neighbours.tolist() if i != k and is_same_surface(faces[i], faces[k], mesh.extent)]
+    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
+    first_of_group = [faces[int(k)] for k in np.unique(group, return_index=True)[1]]
+    mesh, owner = _in_strips(mesh, group[owner], [face.surface for face in first_of_group])
     regions = []
     for g in np.unique(owner):
-        members = [surface for surface, k in zip(surfaces, group, strict=True) if k == g]
-        residual = max((each.residual for each in members if each is not None), default=0.0)
-        region = _region(mesh, np.flatnonzero(owner == g), members[0])
-        regions.append(replace(region, residual=max(region.residual, residual)))
+        region = _region(mesh, np.flatnonzero(owner == g), first_of_group[g].surface)
+        residuals = [face.residual for face, k in zip(faces, group, strict=True) if k == g]
+        regions.append(replace(region, residual=max(region.residual, *residuals)))
     named = name_regions(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
     return RawSolid(solid.name, mesh, solid.places, repairs, named)
 
@@ -58,7 +58,7 @@ def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     return mesh, owner[has_three]
 
 
-def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:
+def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> tuple[Mesh, Any]:
     """With walls between two circles as strips from end to end.
 
     Args:
@@ -66,9 +66,9 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tu
     """
     for k, wall in enumerate(surfaces):
         mine = np.flatnonzero(owner == k)
-        if not isinstance(wall, Wall) or not len(mine) or turn_of(mesh, mine, wall.surface) < WHOLE_TURN:
+        if not isinstance(wall, Round) or not len(mine) or turn_of(mesh, mine, wall) < WHOLE_TURN:
             continue
-        strips = _strips(mesh, mine, wall.surface)
+        strips = _strips(mesh, mine, wall)
         if strips is not None:
             mesh = Mesh(mesh.corners, np.concatenate([np.delete(mesh.triangles, mine, axis=0), strips]))
             owner = np.append(np.delete(owner, mine), np.full(len(strips), k))
@@ -96,13 +96,13 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
     return every[np.where((outward * before > 0.0)[:, None], sides, sides[:, ::-1])]
 
 
-def _region(mesh: Mesh, triangles: Any, surface: Flat | Wall | None) -> Region:
+def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region:
     if surface is None:
         return Region("other", triangles)
     across = mesh.across[triangles]
-    if isinstance(surface, Flat):
+    if isinstance(surface, Plane):
         sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
         return plane_region(mesh, triangles, sign * surface.normal, surface.point)
-    _, _, out = surface.surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
+    _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
-    return round_region(mesh, triangles, surface.surface, hole, turn_of(mesh, triangles, surface.surface))
+    return round_region(mesh, triangles, surface, hole, turn_of(mesh, triangles, surface))

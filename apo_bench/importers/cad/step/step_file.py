@@ -1,4 +1,4 @@
-"""STEP files become raw solids, each shape once with all of its places."""
+"""Read a STEP file into raw solids, each shape once with all of its places."""
 
 import re
 from importlib.util import find_spec
@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.importers.cad.meshes.mesh_file import MOST_CAD_TRIANGLES, CadFile, check_size, read_cad_bytes
+from apo_bench.importers.cad.meshes.mesh_file import CadFile, check_size, check_triangles, read_cad_bytes
 from apo_bench.importers.cad.solids.raw_solid import RawSolid, merge_copies
 from apo_bench.importers.cad.step.from_brep import raw_of
-from apo_bench.importers.cad.step.surfaces import BrepSolid
 
 STEP_SUFFIXES = (".step", ".stp")
 _MOST_SOLIDS = 200
@@ -26,7 +25,7 @@ _UNIT_NAMES = {
 
 
 def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
-    """The solids of a STEP file, each once, with all of its places.
+    """Read the solids of a STEP file, each once, with all of its places.
 
     Raises:
         InputError: The extra is missing, the file cannot be read, or it holds no closed solid of a size for a part.
@@ -35,14 +34,17 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     raw = read_cad_bytes(path, "STEP")
     require(b"ISO-10303-21" in raw[:2000], f"{path}: this is no STEP file; save the part again.")
     require(find_spec("OCP"), f"{path}: reading STEP needs the extra cad; run: pip install 'apo_bench[cad]'")
+    from apo_bench.importers.cad.step.brep import read_solids
+
     own_unit = _unit(raw)
-    solids = _read_solids(path)
+    try:
+        solids = read_solids(path)
+    except (RuntimeError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: the file cannot be read as STEP; save the part again.") from error
     require(solids, f"{path}: the file holds no solid; save the part as a solid, not as curves or a drawing.")
     count = sum(len(face.triangles) for solid in solids for face in solid.faces)
     require(len(solids) <= _MOST_SOLIDS, f"{path}: the file has {len(solids)} solids; {_MOST_SOLIDS} are the most.")
-    require(
-        count <= MOST_CAD_TRIANGLES, f"{path}: the file has {count:,} triangles; {MOST_CAD_TRIANGLES:,} are the most."
-    )
+    check_triangles(path, count)
     for solid in solids:
         size = float(np.ptp(np.concatenate([face.corners for face in solid.faces]), axis=0).max())
         check_size(path, size, f"of a solid in it; unit {own_unit}, stated in the file")
@@ -56,15 +58,6 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
                 raise
             left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
     return CadFile(own_unit, "stated in the file", tuple(left_out)), merge_copies(raws)
-
-
-def _read_solids(path: Path) -> list[BrepSolid]:
-    from apo_bench.importers.cad.step.open_cascade import solids_of
-
-    try:
-        return solids_of(path)
-    except (RuntimeError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: the file cannot be read as STEP; save the part again.") from error
 
 
 def _unit(raw: bytes) -> str:

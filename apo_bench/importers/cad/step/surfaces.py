@@ -1,4 +1,4 @@
-"""Faces of a B-rep and their surfaces, [mm]."""
+"""Faces of a B-rep, and whether two of them lie on one surface, [mm]."""
 
 from typing import Any, NamedTuple
 
@@ -9,34 +9,28 @@ from apo_bench.importers.cad.faces.fitting import Round
 from apo_bench.importers.cad.solids.raw_solid import SolidPlace
 
 _SAME = 1e-6
-"""Faces on surfaces that differ by less, in parts of the size of the solid, are on one."""
+"""Surfaces that differ by less, as a share of the size of the solid, are one."""
 _SAME_RAD = 1e-6
 
 
-class Flat(NamedTuple):
+class Plane(NamedTuple):
     """A plane."""
 
     point: Array
     normal: Array
-    residual: float
-
-
-class Wall(NamedTuple):
-    """A cylinder or a cone."""
-
-    surface: Round
-    residual: float
 
 
 class BrepFace(NamedTuple):
     """A face of a solid."""
 
-    surface: Flat | Wall | None
-    """What contacts can be made with; None: any other one."""
+    surface: Plane | Round | None
+    """A surface that can make contacts, or None."""
+    residual: float
+    """The largest distance of a spline from that surface."""
     corners: Array
     """(c, 3)."""
     triangles: Any
-    """(t, 3), counter-clockwise seen from outside; none if it cannot be cut into such."""
+    """(t, 3), counter-clockwise seen from outside; none if the face cannot be cut into triangles."""
 
 
 class BrepSolid(NamedTuple):
@@ -47,26 +41,22 @@ class BrepSolid(NamedTuple):
     places: tuple[SolidPlace, ...]
 
 
-def is_same(a: Flat | Wall | None, b: Flat | Wall | None, size: float) -> bool:
-    """Whether two faces lie on one surface; never for those of other kinds.
+def is_same_surface(first: BrepFace, second: BrepFace, size: float) -> bool:
+    """Whether two faces lie on one plane, cylinder or cone.
 
     Args:
         size: Of the solid, [mm].
     """
-    if isinstance(a, Flat) and isinstance(b, Flat):
-        near = _SAME * size + 2.0 * (a.residual + b.residual)
-        is_parallel = np.linalg.norm(np.cross(a.normal, b.normal)) <= _SAME_RAD + near / size
-        return bool(is_parallel and abs((b.point - a.point) @ a.normal) < near)
-    if not (isinstance(a, Wall) and isinstance(b, Wall)):
-        return False
-    near = _SAME * size + 2.0 * (a.residual + b.residual)
+    near = _SAME * size + 2.0 * (first.residual + second.residual)
     near_rad = _SAME_RAD + near / size
-    if np.linalg.norm(np.cross(a.surface.axis, b.surface.axis)) > near_rad:
+    a, b = first.surface, second.surface
+    if isinstance(a, Plane) and isinstance(b, Plane):
+        is_parallel = np.linalg.norm(np.cross(a.normal, b.normal)) <= near_rad
+        return bool(is_parallel and abs((b.point - a.point) @ a.normal) < near)
+    if not (isinstance(a, Round) and isinstance(b, Round)) or np.linalg.norm(np.cross(a.axis, b.axis)) > near_rad:
         return False
-    # One axis, and the other cone seen from the first: it may point the other way, and states its radius elsewhere.
-    height, distance, _ = a.surface.polar(b.surface.point[None])
-    slope = b.surface.slope * float(np.sign(a.surface.axis @ b.surface.axis))
-    radius = a.surface.radius + a.surface.slope * height[0]
-    return bool(
-        distance[0] < near and abs(slope - a.surface.slope) < near_rad and abs(radius - b.surface.radius) < near
-    )
+    # The second cone measured from the axis of the first: it may point the other way, and state its radius elsewhere.
+    height, distance, _ = a.polar(b.point[None])
+    slope = b.slope * float(np.sign(a.axis @ b.axis))
+    radius = a.radius + a.slope * height[0]
+    return bool(distance[0] < near and abs(slope - a.slope) < near_rad and abs(radius - b.radius) < near)

@@ -45,8 +45,8 @@ def touch_side(
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
         probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
-        end = translate(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
-        left = press(robot, steady_trajectory(robot.T, end, SPEED), place.way, probing.touch_n, probing.wrist)
+        end = translate(robot.T, place.direction, 2.0 * STAND_OFF_M + BEYOND_M)
+        left = press(robot, steady_trajectory(robot.T, end, SPEED), place.direction, probing.touch_n, probing.wrist)
         if left is not None:
             n, d = probing.plane_by_camera(place.normal, place.edge)
             touches = [probing.touch(robot, n, d, place.point, (operation, held))]

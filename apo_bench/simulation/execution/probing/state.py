@@ -69,11 +69,11 @@ class ProbingState:
         """The force that ends a touch, [N]: well above what the sensor shows of nothing."""
         return touch_guard(self.wrist.sigma[0])
 
-    def off_m(self, robot: Robot, T_world_tip: Array, way: Array) -> float:
+    def off_m(self, robot: Robot, T_world_tip: Array, direction: Array) -> float:
         """How far the tip may be off along a direction, (3,) world, [m]: three standard deviations of its estimate."""
         covariance = self.estimate.covariance_of(T_world_tip, self.jacobian(robot))[:3, :3]
-        way = T_world_tip[:3, :3].T @ way
-        return _OFF_SIGMAS * float(np.sqrt(way @ covariance @ way))
+        direction = T_world_tip[:3, :3].T @ direction
+        return _OFF_SIGMAS * float(np.sqrt(direction @ covariance @ direction))
 
     def plane_by_camera(self, normal: Array, point: Array) -> tuple[Array, float]:
         """A plane of the frame that the arm takes for the world, by normal, (3,), and offset, [m], in the camera's."""
@@ -92,18 +92,18 @@ class ProbingState:
         """The body Jacobian of the tip, (6, joints)."""
         return self._kinematics.jacobian(robot.q)
 
-    def learn(self, robot: Robot, felt: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
+    def learn(self, robot: Robot, touches: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
         """Update the estimate by touches; from now on commands compensate for it.
 
         Args:
-            felt: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
+            touches: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
                 that is estimated to be tilted the foremost corner touched.
             differ: Only what differs between the touches counts, which are of one wall: the fingers give way.
         """
         before = self.estimate
         for _ in range(_CORNERS):
-            touches = [self._cornered(touch, patch) for touch, patch in felt]
-            self.estimate = before.touch(*(_less_common(before, touches) if differ else touches))
+            cornered = [self._cornered(touch, patch) for touch, patch in touches]
+            self.estimate = before.touch(*(_less_common(before, cornered) if differ else cornered))
         left = self._error
         E = self.estimate.hand_eye
         tool = np.array(left.tool)

@@ -56,14 +56,14 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
         those = places(probing.plan, robot.scene, partial(_stand_off, robot, probing))
-        felt = list[tuple[Touch, Array]]()
+        touches = list[tuple[Touch, Array]]()
         for place in those:
             try:
-                felt += _touch(robot, probing, place)
+                touches += _touch(robot, probing, place)
             except ExecutionAborted as aborted:
                 aborted.why = _room(robot, probing, place)
                 raise
-        probing.learn(robot, felt, differ=places is opposite_places)
+        probing.learn(robot, touches, differ=places is opposite_places)
 
 
 def _stand_off(robot: Robot, probing: ProbingState, T: Array, normal: Array) -> float:
@@ -72,7 +72,7 @@ def _stand_off(robot: Robot, probing: ProbingState, T: Array, normal: Array) -> 
 
 def _room(robot: Robot, probing: ProbingState, place: TouchPlace) -> str:
     """What to say where something was struck: nothing if the robot had room for what it may be off."""
-    far = max(probing.off_m(robot, place.T_world_tip, way) for way in np.eye(3))
+    far = max(probing.off_m(robot, place.T_world_tip, direction) for direction in np.eye(3))
     if far <= ROOM_M:
         return ""
     before = f"it began {1e3 * place.stand_off:.1f} mm before what it would touch, with {1e3 * ROOM_M:g} mm of room"
@@ -82,7 +82,7 @@ def _room(robot: Robot, probing: ProbingState, place: TouchPlace) -> str:
 def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple[Touch, Array]]:
     """Go there, press, come back; the touch, if there was one, and what of the hand may have touched."""
     T = probing.residual.hand_eye @ place.T_world_tip @ probing.residual.tool
-    way = probing.residual.hand_eye[:3, :3] @ place.way
+    direction = probing.residual.hand_eye[:3, :3] @ place.direction
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
     robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _OVER))
     rest = robot.scene.kinematics.forward(robot.scene.arm.home)
@@ -93,8 +93,8 @@ def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple
     robot.stand()
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
-        end = translate(robot.T, way, 2.0 * place.stand_off + BEYOND_M)
-        left = press(robot, steady_trajectory(robot.T, end, SPEED), way, probing.touch_n, probing.wrist)
+        end = translate(robot.T, direction, 2.0 * place.stand_off + BEYOND_M)
+        left = press(robot, steady_trajectory(robot.T, end, SPEED), direction, probing.touch_n, probing.wrist)
         touched = probing.touch(robot, place.normal, place.offset, place.patch.mean(axis=0))
         robot.follow(smooth_trajectory(robot.T, T, _BACK))
     robot.follow(smooth_trajectory(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))

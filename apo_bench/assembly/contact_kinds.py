@@ -1,0 +1,52 @@
+"""What kind of contact two faces make, and how much play their sizes leave."""
+
+from typing import Literal
+
+from apo_bench.geometry import Face, RoundFace
+
+ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
+OPPOSING = -0.9
+"""Largest cosine between the normals of two faces that look at each other: contacts leave tilts of a few degrees."""
+WALLS = 8
+"""Planes through an axis that stand for the disc of a round fit: sixteen walls, whose corners lie on its circle."""
+_SAME_SLOPE = 2e-3
+"""A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
+
+
+def contact_kind(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
+    """The kind of contact that two faces can make, in either order; None if they can make none."""
+    if isinstance(a, Face) and isinstance(b, Face):
+        return "plane on plane"
+    if isinstance(a, Face) or isinstance(b, Face):
+        wall = b if isinstance(a, Face) else a
+        assert isinstance(wall, RoundFace)
+        return "shaft on plane" if wall.kind == "cylinder" and not wall.hole else None
+    if a.kind == "rim" or b.kind == "rim":
+        rim, cone = (a, b) if a.kind == "rim" else (b, a)
+        return "cone on rim" if cone.kind == "cone" and rim.hole != cone.hole else None
+    if a.hole == b.hole or a.kind != b.kind:
+        return None
+    if a.kind == "cylinder":
+        return "shaft in hole"
+    return "cone in cone" if abs(abs(a.slope) - abs(b.slope)) < _SAME_SLOPE else None
+
+
+def geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
+    """By how much the radius of a hole is larger than that of its shaft, [m]; 0 of every other contact.
+
+    Negative where the shaft is thicker than the hole.
+    """
+    if isinstance(a, Face) or isinstance(b, Face) or contact_kind(a, b) != "shaft in hole":
+        return 0.0
+    return a.radius - b.radius if a.hole else b.radius - a.radius
+
+
+def play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
+    """How far faces that go into one another may be off, [mm]: the clearance if one is fit, and what radii leave.
+
+    None of faces that only touch.
+    """
+    fits = a.fit or b.fit
+    if not fits and contact_kind(a, b) != "shaft in hole":
+        return None
+    return clearance_mm * fits + 1e3 * geometric_play(a, b)

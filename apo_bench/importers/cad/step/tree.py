@@ -1,0 +1,96 @@
+"""Read the tree of a STEP file by Open CASCADE: shapes with their names, places and colours."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from OCP import TDF, IFSelect, Quantity, STEPCAFControl, TCollection, TDataStd, TDocStd, TopLoc, XCAFDoc
+from OCP import collections as sequences
+
+from apo_bench.geometry import Array
+from apo_bench.importers.cad.solids.raw_solid import Rgb, SolidPlace
+
+_NO_NAME = re.compile(
+    r"|=>\[.*|NAUO\d*|\d+|SOLID|SHELL|COMPOUND|Next assembly (usage|relationship)|Open CASCADE STEP translator.*",
+    re.IGNORECASE,
+)
+"""Names that programs write where a person gave none."""
+_Leaf = tuple[str, Any, SolidPlace]
+"""The name of a part, its shape in its own frame, and one of its places, which may have the name of the part."""
+
+
+def read_leaves(path: Path) -> Iterator[_Leaf]:
+    """Return the shapes that are no assemblies, in the order of the file.
+
+    Raises:
+        ValueError: The file cannot be read.
+    """
+    document = TDocStd.TDocStd_Document(TCollection.TCollection_ExtendedString("XCAF"))
+    reader = STEPCAFControl.STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.SetColorMode(True)
+    if reader.ReadFile(str(path)) != IFSelect.IFSelect_RetDone or not reader.Transfer(document):
+        raise ValueError("no STEP file")
+    roots = sequences.Sequence_TDF_Label()
+    XCAFDoc.XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
+    colors = XCAFDoc.XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    for root in roots:
+        yield from _leaves_below(root, np.eye(4), path.stem, path.stem, colors)
+
+
+def _leaves_below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterator[_Leaf]:
+    """Return the leaves of one entry of the tree.
+
+    Args:
+        product, name: Of the entry around it, for those that have none.
+    """
+    part = label
+    if XCAFDoc.XCAFDoc_ShapeTool.IsReference_s(label):
+        part = TDF.TDF_Label()
+        XCAFDoc.XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
+    own_name = _name(part)
+    product = own_name or product
+    name = _name(label) or own_name or name
+    here = T @ matrix_of(XCAFDoc.XCAFDoc_ShapeTool.GetLocation_s(label).Transformation())
+    if XCAFDoc.XCAFDoc_ShapeTool.IsAssembly_s(part):
+        inside = sequences.Sequence_TDF_Label()
+        XCAFDoc.XCAFDoc_ShapeTool.GetComponents_s(part, inside)
+        for each in inside:
+            yield from _leaves_below(each, here, product, name, colors)
+        return
+    # A shape in its own frame, so that all of its copies are one shape, and the place of that frame.
+    placed = XCAFDoc.XCAFDoc_ShapeTool.GetShape_s(part)
+    shape = placed.Located(TopLoc.TopLoc_Location())
+    of_label = XCAFDoc.XCAFDoc_ColorTool.GetColor_s
+    color = _color(of_label, label) or _color(of_label, part) or _color(colors.GetColor, shape)
+    yield product, shape, SolidPlace(name, here @ matrix_of(placed.Location().Transformation()), color)
+
+
+def _name(label: Any) -> str:
+    """The name that a person gave, or empty."""
+    attribute = TDataStd.TDataStd_Name()
+    if not label.FindAttribute(TDataStd.TDataStd_Name.GetID_s(), attribute):
+        return ""
+    text = attribute.Get().ToExtString()
+    with suppress(UnicodeError):  # the letters of a UTF-8 file are read, and by some programs written, byte by byte
+        text = text.encode("latin-1").decode("utf-8")
+    text = "".join(c if c.isprintable() else " " for c in text).strip()
+    return "" if _NO_NAME.fullmatch(text) else text
+
+
+def _color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
+    """The colour of the surface of an entry of the tree or a shape, else that of all of it."""
+    color = Quantity.Quantity_Color()
+    if not any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen)):
+        return None
+    r, g, b = np.clip(color.Values(Quantity.Quantity_TOC_sRGB), 0.0, 1.0).tolist()
+    return r, g, b
+
+
+def matrix_of(transformation: Any) -> Array:
+    """Return a transformation of Open CASCADE as a matrix, (4, 4), [mm]."""
+    rows = [[transformation.Value(i, k) for k in range(1, 5)] for i in range(1, 4)]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
