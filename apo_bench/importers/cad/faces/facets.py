@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.importers.cad.solids.mesh import Mesh, connected
+from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
 
 FEWEST_SIDES = 12
 """Flat pieces are taken for a round face if a whole turn of it has so many, or more."""
@@ -45,7 +45,7 @@ def widest_of(fewest: int) -> float:
     return WHOLE_TURN / (fewest - 0.5)
 
 
-def facets_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
+def find_facets(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     """Cut a closed mesh into flat pieces.
 
     Args:
@@ -60,7 +60,7 @@ def facets_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     # Two triangles are of one piece if they look the same way, or nearly so and neither leaves the plane of the other.
     off = np.maximum(_height(mesh, normals, i, k), _height(mesh, normals, k, i))
     flat = (angle < _SAME_RAD) | ((angle < _NEAR_RAD) & (off < FLAT * mesh.extent))
-    count, of = connected(mesh.neighbours[flat], len(mesh.triangles))
+    count, of = connected_groups(mesh.neighbours[flat], len(mesh.triangles))
     # Sums over the triangles of a piece: of n times twice the area, and of the middles, weighed by the area.
     across = np.zeros((count, 3))
     np.add.at(across, of, mesh.across)

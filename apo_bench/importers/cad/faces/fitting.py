@@ -70,7 +70,7 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
 
-def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
+def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None:
     """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt.
 
     None: there is no start, there are too few points, or nothing fits.
@@ -108,7 +108,7 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 
 
-def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
+def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
     """Which flat pieces lie on a round surface.
 
     Args:
@@ -155,10 +155,10 @@ def axis_of(normals: Array, cone: bool) -> Array:
     return np.asarray(np.linalg.svd(rows, full_matrices=len(rows) < 3)[2][2])
 
 
-def fitted_plane(mesh: Mesh, triangles: Any) -> Region:
+def fit_plane(mesh: Mesh, triangles: Any) -> Region:
     """The plane nearest to triangles that lie in one."""
     n = mesh.across[triangles].sum(axis=0)
-    n = _snapped(n / np.linalg.norm(n))
+    n = _snap(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
     weight = np.linalg.norm(mesh.across[triangles], axis=1)
     return plane_region(mesh, triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
@@ -166,7 +166,7 @@ def fitted_plane(mesh: Mesh, triangles: Any) -> Region:
 
 def plane_region(mesh: Mesh, triangles: Any, normal: Array, point: Array) -> Region:
     """Triangles on the plane through a point."""
-    n = _snapped(normal / np.linalg.norm(normal))
+    n = _snap(normal / np.linalg.norm(normal))
     d = float(point @ n)
     points = mesh.corners[np.unique(mesh.triangles[triangles])]
     return Region("plane", triangles, float(np.abs(points @ n - d).max()), direction=n, point=d * n)
@@ -178,7 +178,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     # origin, so that one file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
     slope = surface.slope * float(np.sign(axis @ surface.axis))
-    axis = _snapped(axis)
+    axis = _snap(axis)
     point = surface.point - surface.point @ axis * axis
     foot = float(surface.point @ axis)
     every = np.unique(mesh.triangles[triangles])
@@ -227,7 +227,7 @@ def turn_of(mesh: Mesh, triangles: Any, wall: Round) -> float:
     return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
 
 
-def _snapped(n: Array) -> Array:
+def _snap(n: Array) -> Array:
     """A direction along an axis of the frame, if it is so within rounding."""
     axis = int(np.abs(n).argmax())
     exact = np.sign(n[axis]) * np.eye(3)[axis]

@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
-from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
-from apo_bench.importers.cad.solids.mesh import Mesh, connected
+from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, facets_on, refine_round
+from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
 
 _FEWEST = 3
 _MOST_WORK = 3_000_000
@@ -33,7 +33,7 @@ class FoundWall(NamedTuple):
         return round(WHOLE_TURN / float(np.median(self.spans)))
 
 
-def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
+def find_walls(mesh: Mesh, facets: Facets) -> list[FoundWall]:
     """Cylinders and cones, in each smooth part of the surface: first all of it, then from edges in it."""
     walls: list[FoundWall] = []
     work = _MOST_WORK
@@ -44,18 +44,18 @@ def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
         # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
         points = mesh.corners[np.unique(facets.along[inside])]
         axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
-        starts = ((refined(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
-        whole = _grown(mesh, facets, group, inside, starts)
+        starts = ((refine_round(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
+        whole = _grow(mesh, facets, group, inside, starts)
         work -= 2 * len(group)
         if whole is not None and len(whole.members) == len(group):
             walls.append(whole)
         else:
             found, work = _from_edges(mesh, facets, group, inside, work)
-            walls += _together(mesh, facets, group, inside, found)
+            walls += _merge_walls(mesh, facets, group, inside, found)
     return walls
 
 
-def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
+def _merge_walls(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
     """Walls of a smooth part of the surface, the large ones with what small ones had taken of them.
 
     Few sides lie on many a wall beside the true one.
@@ -67,11 +67,11 @@ def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[F
         rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
         if len(rest.members) < _FEWEST:
             continue
-        near, _, _ = on_it(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
+        near, _, _ = facets_on(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
         if len(near) > len(rest.members):
             untaken = inside & np.isin(facets.smooth, left).all(axis=1)
             start = (wall.surface, wall.surface.slope != 0.0)
-            more = _grown(mesh, facets, left, untaken, [start], int(rest.members[0]))
+            more = _grow(mesh, facets, left, untaken, [start], int(rest.members[0]))
             rest = more if more is not None and len(more.members) > len(rest.members) else rest
         walls.append(rest)
         left = np.setdiff1d(left, rest.members)
@@ -100,11 +100,11 @@ def _from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) 
         best = None
         for cone in (False, True):
             start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
-            if start is None or len(on_it(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
+            if start is None or len(facets_on(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
                 continue
             left = group[~taken[group]]
             untaken = inside & ~taken[facets.smooth].any(axis=1)
-            best = _grown(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
+            best = _grow(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
             work -= 4 * len(left)
             if best is not None:
                 break
@@ -153,10 +153,10 @@ def _seed_cone(
     if len(members) < 5:
         return None, near
     points = mesh.corners[np.unique(facets.along[sorted(rows)])]
-    return refined(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
+    return refine_round(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
 
 
-def _grown(
+def _grow(
     mesh: Mesh,
     facets: Facets,
     among: Any,
@@ -179,7 +179,7 @@ def _grown(
         for _ in range(8):
             if surface is None or not surface.radius < 50.0 * mesh.extent:
                 break
-            members, hole, spans = on_it(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
+            members, hole, spans = facets_on(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
             if seed is not None:
                 members, spans = _with_seed(facets, inside, members, spans, seed)
             if len(members) < _FEWEST:
@@ -193,7 +193,7 @@ def _grown(
             # Only corners of edges within the surface: those on its border may belong to a chamfer or a fillet.
             both = inside & np.isin(facets.smooth, members).all(axis=1)
             points = mesh.corners[np.unique(facets.along[both])]
-            surface = refined(surface, points, cone) if len(points) >= 6 else None
+            surface = refine_round(surface, points, cone) if len(points) >= 6 else None
         if best is not None and (not cone or abs(best.surface.slope) > 1e-3):
             return best
     return None
@@ -219,4 +219,4 @@ def smooth_groups(facets: Facets, members: Any) -> list[Any]:
 
 def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
     """How many groups members, ascending, are by the pairs among them, and the group of each."""
-    return connected(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))
+    return connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

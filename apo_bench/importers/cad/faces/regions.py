@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN
-from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, facets_of
-from apo_bench.importers.cad.faces.fitting import fitted_plane, round_region
-from apo_bench.importers.cad.faces.growing import FoundWall, smooth_groups, walls_of
+from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
+from apo_bench.importers.cad.faces.fitting import fit_plane, round_region
+from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_groups
 from apo_bench.importers.cad.solids.mesh import Mesh
 from apo_bench.importers.cad.solids.region import Region, square_to
 
@@ -46,8 +46,8 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     Args:
         fewest: Of the sides that a round face has in a whole turn; what has fewer is so many flat faces.
     """
-    facets = facets_of(mesh, fewest)
-    every = _without_bands(mesh, facets, walls_of(mesh, facets))
+    facets = find_facets(mesh, fewest)
+    every = _drop_bands(mesh, facets, find_walls(mesh, facets))
     walls = [wall for wall in every if wall.sides >= fewest]
     triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
     regions = [
@@ -56,8 +56,8 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     ]
     left = _wall_of_pieces(facets, walls) < 0
     thin = facets.areas < (FLAT * mesh.extent) ** 2
-    free = _free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
-    regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
+    free = _find_free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
+    regions += [fit_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
     groups = smooth_groups(facets, np.flatnonzero(free))
     regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
     return tuple(sorted(regions, key=lambda region: int(region.triangles[0])))
@@ -71,7 +71,7 @@ def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
     return of
 
 
-def _free(facets: Facets, left: Any) -> Any:
+def _find_free(facets: Facets, left: Any) -> Any:
     """Which flat pieces belong to surfaces that are neither flat nor round."""
     pairs = facets.smooth[left[facets.smooth].all(axis=1) & (np.abs(facets.angle) < SMOOTH_RAD)]
     free = np.zeros(len(left), dtype=bool)
@@ -84,7 +84,7 @@ def _free(facets: Facets, left: Any) -> Any:
     return free
 
 
-def _without_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
+def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
     """Without bands of tori, spheres and free surfaces, which go over into others like them at both ends."""
     of = _wall_of_pieces(facets, walls)
     bands: set[int] = set()

@@ -35,14 +35,14 @@ def corners_of(body: Any) -> Array:
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
-def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
         cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
     """
-    points = np.round(without_near(points), _DIGITS)
+    points = np.round(merge_near_points(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
     # Sides of a hull that differ by rounding are one; a corner between two such sides is then inside of the piece.
     for _ in range(4):
@@ -55,7 +55,7 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
 
 
 def reduce_corners(corners: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
-    """Return the corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
+    """Return the corners of a convex piece, or of too many those that leave out the least of it; see `hull_corners`."""
     corners = corners[np.sort(ConvexHull(corners).vertices)]
     if _is_simple(corners):
         return np.asarray(corners)
@@ -103,7 +103,7 @@ def _farthest(corners: Array) -> Any:
     return np.unique((corners @ way.T).argmax(axis=0))
 
 
-def without_near(points: Array) -> Array:
+def merge_near_points(points: Array) -> Array:
     """Points without those that are near to an earlier one."""
     return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
 

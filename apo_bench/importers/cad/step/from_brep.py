@@ -10,9 +10,9 @@ from scipy.spatial import ConvexHull
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
-from apo_bench.importers.cad.meshes.joining import SAME_CORNER, join_corners
+from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
-from apo_bench.importers.cad.solids.mesh import Mesh, connected, put_together
+from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, connected_groups
 from apo_bench.importers.cad.solids.naming import name_regions
 from apo_bench.importers.cad.solids.raw_solid import RawSolid
 from apo_bench.importers.cad.solids.region import Region
@@ -38,7 +38,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
     neighbours = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
     pairs = [(i, k) for i, k in neighbours.tolist() if i != k and is_same_surface(faces[i], faces[k], mesh.extent)]
-    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
+    _, group = connected_groups(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
     first_of_group = [faces[int(k)] for k in np.unique(group, return_index=True)[1]]
     mesh, owner = _in_strips(mesh, group[owner], [face.surface for face in first_of_group])
     regions = []
@@ -52,9 +52,9 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
 
 def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     """The triangles of all faces with common corners, and the face of each."""
-    whole = put_together([Mesh(face.corners, face.triangles) for face in faces])
+    whole = concatenate_meshes([Mesh(face.corners, face.triangles) for face in faces])
     owner = np.repeat(np.arange(len(faces)), [len(face.triangles) for face in faces])
-    mesh, has_three = join_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
+    mesh, has_three = merge_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
     return mesh, owner[has_three]
 
 
