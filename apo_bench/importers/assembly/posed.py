@@ -35,7 +35,7 @@ class PosedPart:
     """(4, 4), in the frame of the assembly, [m]."""
     color: tuple[float, ...] | None = None
     fit: Mapping[str, float] = field(default_factory=dict)
-    """Faces that recede although the file does not say so, and by how much before the clearance, [mm]."""
+    """More faces that fit than the part file marks -> by how much they recede before the clearance, [mm]."""
     title: str = ""
     """Its name in the CAD file, where that cannot be its name here."""
 
@@ -91,7 +91,7 @@ def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, 
     """Return the same assembly, upright, its lowest point on the table, its middle over the origin.
 
     Args:
-        up: The axis of the poses that looks up, of `UPS`.
+        up: The axis of the poses that points up, of `UPS`.
     """
     axis, sign = UPS[up]
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])

@@ -1,4 +1,4 @@
-"""Planes, cylinders and cones fitted to flat pieces of a surface: what of it lies on them, and where they end."""
+"""Fit planes, cylinders and cones to flat pieces of a surface, and find the pieces on them and their ends."""
 
 from typing import Any, NamedTuple
 
@@ -12,9 +12,9 @@ from apo_bench.importers.cad.solids.region import Region, square_to
 
 _MOST_POINTS = 400
 _TURNED = 0.09
-"""How far a flat piece may be turned from what it stands for, beside half of the angle that it spans, [rad]."""
+"""How far a flat piece may be turned from its round face, beyond half of the angle that it spans, [rad]."""
 _WIDEST = 1.6
-"""No strip of a round face is this much wider than most of them, unless all of it is near to the face."""
+"""No strip of a round face is wider than most by this factor, unless all of it is near to the face."""
 NEAR_MM = 0.02
 """Sides stand for a round face if they, and their corners, are this near to it."""
 ON_WALL = 1e-5
@@ -80,7 +80,7 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
     points = points[:: -(-len(points) // _MOST_POINTS)]
     middle = points.mean(axis=0)
     height, distance, _ = start.polar(points)
-    # The point of the axis beside the middle of the points, so that turns of the axis and the radius hardly interact.
+    # The point of the axis next to the middle of the points, so that turns of the axis and the radius hardly interact.
     at = start.point + (middle - start.point) @ start.axis * start.axis
     size = max(float(np.ptp(points, axis=0).max()), 1e-300)
     x, y = square_to(start.axis)
@@ -112,7 +112,7 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
     """Which flat pieces lie on a round surface.
 
     Args:
-        among: Which ones to look at, ascending.
+        among: The pieces to measure, ascending.
 
     Returns:
         Those that do; whether it is a hole; and the angle that each spans, [rad].
@@ -140,7 +140,7 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
     good &= np.abs(facing) > np.cos(np.minimum(span / 2.0 + _TURNED, 1.0))
     if not good.any():
         return among[good], False, span[good]
-    # A hole if most of the area looks to the axis; what looks the other way is of another face.
+    # A hole if most of the area faces the axis; the other pieces are of another face.
     hole = bool((np.sign(facing[good]) * facets.areas[among][good]).sum() < 0.0)
     good &= (facing < 0.0) == hole
     if good.any():

@@ -1,7 +1,4 @@
-"""The faces of a mesh: flat pieces that meet smoothly are tried as cylinders and cones, and what is left as planes.
-
-Bands of tori, spheres and free surfaces look like cylinders and cones one by one, and are none.
-"""
+"""Find the faces of a mesh: cylinders and cones that no free surface contains as bands, then planes."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +12,7 @@ from apo_bench.importers.cad.solids.mesh import Mesh
 from apo_bench.importers.cad.solids.region import Region, square_to
 
 _LARGER = 8.0
-"""A flat piece so much larger than most of its neighbours on a free surface, slivers aside, is a plane beside it."""
+"""A flat piece that is larger by this factor than most of its neighbours on a free surface is a plane next to it."""
 _BAND = 3.0
 """Bands of one free surface differ by less than this in how wide they are and how they bend."""
 _GAP = 1.8
@@ -44,7 +41,7 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     """The faces of a closed mesh, in an order that its triangles give.
 
     Args:
-        fewest: Of the sides that a round face has in a whole turn; what has fewer is so many flat faces.
+        fewest: Sides of a whole turn of a round face; a wall with fewer sides is flat faces.
     """
     facets = find_facets(mesh, fewest)
     every = _drop_bands(mesh, facets, find_walls(mesh, facets))
@@ -76,7 +73,7 @@ def _find_free(facets: Facets, left: Any) -> Any:
     pairs = facets.smooth[left[facets.smooth].all(axis=1) & (np.abs(facets.angle) < SMOOTH_RAD)]
     free = np.zeros(len(left), dtype=bool)
     free[pairs] = True
-    # Of each piece the areas beside it, ascending: what is far larger than the upper quartile is a plane.
+    # Of each piece the areas of its neighbours, ascending: a piece far larger than their upper quartile is a plane.
     owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((facets.areas[other], owner))
     pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)

@@ -13,7 +13,7 @@ _MOST_SIDES = 300
 _MOST_DIRECTIONS = 190
 """Of a piece; of one that has more, the farthest corners are kept."""
 _INSIDE_M = 5e-8
-"""Corners so far inside of a piece are none of it."""
+"""A point deeper inside of a piece is no corner of it."""
 _THIN_MM = 0.02
 """Pieces thinner than this across are left out."""
 _ON_MM = 2e-4
@@ -80,7 +80,7 @@ def _is_simple(corners: Array) -> bool:
 
 
 def _on_flats(corners: Array, flats: Array, many: int) -> Any:
-    """Those that are farthest in a flat face, in so many directions."""
+    """The farthest corners in flat faces, in some directions each."""
     kept = [np.zeros(0, dtype=np.intp)]
     turn = 2.0 * np.pi * np.arange(many) / many
     for n, d in zip(flats[:, :3], flats[:, 3], strict=True):

@@ -19,11 +19,11 @@ from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
-"""A gap between corners of a ring that is so much wider than most belongs to no wall."""
+"""A gap between corners of a ring that is wider than most by this factor belongs to no wall."""
 
 
 def least_pieces(bores: Sequence[Region]) -> int:
-    """How many wedges stand around round holes at least."""
+    """Return the smallest number of wedges around round holes."""
     return sum(sides_of(1e-3 * max(bore.radii)) for bore in bores)
 
 
@@ -137,7 +137,7 @@ def _on_wall(corners: Array, shaft: Region) -> Any:
 
 
 def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
-    """Angles of corners that a wall of so many sides needs beside those of a ring; whether they stand for all of it."""
+    """Angles of the corners that a wall needs beyond those of a ring, and whether they stand for all of it."""
     if len(ring) < 3:
         return ring[:0], False
     gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))

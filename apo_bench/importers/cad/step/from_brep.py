@@ -89,7 +89,7 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
         return None
     hull = ConvexHull(points).simplices
     sides = hull[np.ptp(height[hull], axis=1) > near]
-    # They look the way that the triangles did: outwards, or towards the axis for a hole.
+    # They face as the triangles did: outwards, or towards the axis for a hole.
     across = np.cross(points[sides[:, 1]] - points[sides[:, 0]], points[sides[:, 2]] - points[sides[:, 0]])
     outward = (across * wall.polar(points[sides].mean(axis=1))[2]).sum(axis=1)
     before = (mesh.across[triangles] * wall.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))[2]).sum()
