@@ -8,10 +8,10 @@ from typing import Annotated, final
 import msgspec
 import numpy as np
 
-from apo_bench.errors import InputError, require
+from apo_bench.errors import require
 from apo_bench.geometry import Array, Solid, pose, world_bounds
 from apo_bench.importers.cad.solids.naming import free_name
-from apo_bench.io import read_bytes
+from apo_bench.io import Table, read_typed
 from apo_bench.scenario.parts import load_part, part_path
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
@@ -40,7 +40,7 @@ class PosedPart:
     """Its name in the CAD file, where that cannot be its name here."""
 
 
-class _Pose(msgspec.Struct, forbid_unknown_fields=True):
+class _Pose(Table, frozen=True):
     """One table of a file of poses."""
 
     part: str
@@ -51,7 +51,7 @@ class _Pose(msgspec.Struct, forbid_unknown_fields=True):
     color: tuple[_Share, _Share, _Share] | None = None
 
 
-class _PoseFile(msgspec.Struct, forbid_unknown_fields=True):
+class _PoseFile(Table, frozen=True):
     """A file of poses."""
 
     pose: list[_Pose]
@@ -66,10 +66,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
     """
-    try:
-        stated = msgspec.toml.decode(read_bytes(poses, "file of poses"), type=_PoseFile).pose
-    except (msgspec.DecodeError, ValueError) as error:
-        raise InputError(f"{poses}: {' '.join(str(error).split())}.") from error
+    stated = read_typed(poses, _PoseFile, "file of poses").pose
     paths = {part_path(file).stem: part_path(file) for file in files}
     solids: dict[Path, Solid] = {}
     parts: list[PosedPart] = []

@@ -166,7 +166,8 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
 def _alike(xi: Array) -> float:
     """How many times the variance of a mean is that of independent frames: errors of neighbours may be correlated.
 
-    It follows from differences, which a shift of the mean does not touch: their mean square is 2 (1 - r) times the variance.
+    It follows from differences, which a shift of the mean does not change: their mean square is 2 (1 - r) times the
+    variance.
     """
     # Neighbours differ by 2 (1 - r) v in the mean square, frames that are far apart by 2 v. The variance of a mean of
     # errors with correlation r from frame to frame is (1 + r) / (1 - r) times that of independent ones.

@@ -161,15 +161,13 @@ def fit_plane(mesh: Mesh, triangles: Any) -> Region:
     n = _snap(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
     weight = np.linalg.norm(mesh.across[triangles], axis=1)
-    return plane_region(mesh, triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
+    return plane_region(triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
 
 
-def plane_region(mesh: Mesh, triangles: Any, normal: Array, point: Array) -> Region:
+def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
     """Triangles on the plane through a point."""
     n = _snap(normal / np.linalg.norm(normal))
-    d = float(point @ n)
-    points = mesh.corners[np.unique(mesh.triangles[triangles])]
-    return Region("plane", triangles, float(np.abs(points @ n - d).max()), direction=n, point=d * n)
+    return Region("plane", triangles, direction=n, point=float(point @ n) * n)
 
 
 def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
@@ -195,7 +193,6 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     return Region(
         "cone" if slope else "cylinder",
         triangles,
-        float(np.abs(off[on]).max(initial=0.0)),
         direction=axis,
         point=point,
         span=(low, high),

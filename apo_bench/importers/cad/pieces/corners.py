@@ -1,5 +1,6 @@
 """Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,10 @@ _NO_PLANES = np.zeros((0, 4))
 _MOST_TRIED = 500
 _IN_PLANE = (16, 8, 4)
 """In how many directions corners of a flat face are kept first."""
-_FEWEST = 12
+_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+"""Directions in space in which corners are kept first."""
 _AT_A_TIME = 3
-LEFT_MM = 0.02
+_LEFT_MM = 0.02
 """How far off a piece with fewer corners the surface may lie where others come by."""
 
 
@@ -51,24 +53,25 @@ def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array
         if not inside.any():
             break
         corners = corners[~inside]
-    return np.asarray(corners) if _is_simple(corners) else reduce_corners(corners, flats, cuts)
+    return np.asarray(corners) if _is_simple(corners) else _reduce(corners, np.concatenate([flats, cuts]))
 
 
-def reduce_corners(corners: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
-    """Return the corners of a convex piece, or of too many those that leave out the least of it; see `hull_corners`."""
-    corners = corners[np.sort(ConvexHull(corners).vertices)]
-    if _is_simple(corners):
-        return np.asarray(corners)
+def _reduce(corners: Array, planes: Array) -> Array:
+    """The corners of a piece that has too many, of which the others leave out the least of it.
+
+    Args:
+        planes: Of flat faces and cuts, (k, 4), whose outlines are kept first.
+    """
     for many in _IN_PLANE:
-        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners))
+        kept = np.union1d(_on_flats(corners, planes, many), (corners @ _DIRECTIONS.T).argmax(axis=0))
         best = corners[kept]
         if _is_simple(best):
             break
     while _is_simple(corners[kept]):
         best = corners[kept]
-        planes = ConvexHull(best).equations
-        off = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-        if off.max() < LEFT_MM:
+        sides = ConvexHull(best).equations
+        off = (corners @ sides[:, :3].T + sides[:, 3]).max(axis=1)
+        if off.max() < _LEFT_MM:
             break
         kept = np.union1d(kept, np.argsort(-off)[:_AT_A_TIME])
     return np.asarray(best)
@@ -90,17 +93,6 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
             way = np.outer(x, np.cos(turn)) + np.outer(y, np.sin(turn))
             kept.append(mine[(corners[mine] @ way).argmax(axis=0)])
     return np.unique(np.concatenate(kept))
-
-
-def _farthest(corners: Array) -> Any:
-    """The farthest corners in some directions in space, and along the axes of the frame."""
-    # Evenly spread directions: equal steps of height, turned by the golden angle from one to the next.
-    k = np.arange(_FEWEST) + 0.5
-    up = 1.0 - 2.0 * k / _FEWEST
-    turn = np.pi * (1.0 + 5.0**0.5) * k
-    flat = np.sqrt(1.0 - up**2)
-    way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])
-    return np.unique((corners @ way.T).argmax(axis=0))
 
 
 def merge_near_points(points: Array) -> Array:

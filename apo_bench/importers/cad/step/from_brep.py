@@ -1,6 +1,5 @@
 """A solid of a B-rep becomes a closed mesh whose triangles belong to faces with the parameters of the file."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +42,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     mesh, owner = _in_strips(mesh, group[owner], [face.surface for face in first_of_group])
     regions = []
     for g in np.unique(owner):
-        region = _region(mesh, np.flatnonzero(owner == g), first_of_group[g].surface)
-        residuals = [face.residual for face, k in zip(faces, group, strict=True) if k == g]
-        regions.append(replace(region, residual=max(region.residual, *residuals)))
+        regions.append(_region(mesh, np.flatnonzero(owner == g), first_of_group[g].surface))
     named = name_regions(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
     return RawSolid(solid.name, mesh, solid.places, repairs, named)
 
@@ -102,7 +99,7 @@ def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region
     across = mesh.across[triangles]
     if isinstance(surface, Plane):
         sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
-        return plane_region(mesh, triangles, sign * surface.normal, surface.point)
+        return plane_region(triangles, sign * surface.normal, surface.point)
     _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
     return round_region(mesh, triangles, surface, hole, turn_of(mesh, triangles, surface))
