@@ -1,7 +1,7 @@
 """Draw the examples of the paper as strips: `python docs/examples.py [NAME...]` (two minutes, no display needed).
 
-Of each, the failure that the paper predicts (what was seen is replayed), then what the robot does about it, picture by
-picture as in Fig. 11, 14 and 17; of Fig. 6 the six steps. Only the human is careless here: noise level 0.
+Of each the failure that the paper predicts, with observed poses, then the correction by the robot, picture by picture
+as in Fig. 11, 14 and 17; of Fig. 6 the six steps. The only error is that of the human: noise level 0.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from apo_bench.assembly import Plan, ReplayResult
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
+from apo_bench.simulation.scene.render import SceneCamera, aim_camera, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
@@ -55,7 +55,7 @@ EXAMPLES = {
     "stick_in_tower": Strip(
         "Example 5.1: goals {3} fail, {3, 2} hold",
         "paper-track",
-        "Fig. 10: as seen",
+        "Fig. 10: observed",
         (
             Moment("(a) castle 2 comes off", 2, 0.42),
             Moment("(b) and down by T2'", 2, 0.86),
@@ -65,7 +65,7 @@ EXAMPLES = {
     "carried_bridge": Strip(
         "Example 5.2: goals {5}, {5, 4}, {5, 4, 3} fail, {5, 4, 3, 2} hold",
         "paper-track",
-        "Fig. 13: as seen",
+        "Fig. 13: observed",
         (
             Moment("(a) step 4 undone", 4, 0.3),
             Moment("(b) step 3 undone", 5, 0.45),
@@ -79,7 +79,7 @@ EXAMPLES = {
     "vanished_fixture": Strip(
         "Example 5.3: goals {5}, {5, 3} fail, {5, 3, 2} hold",
         "paper-track",
-        "Fig. 16: as seen",
+        "Fig. 16: observed",
         (
             Moment("(a) step 4 undone", 4, 0.86),
             Moment("(b) step 3 undone", 5, 0.45),
@@ -93,7 +93,7 @@ EXAMPLES = {
     "pocket_table": Strip(
         "Fig. 6: the example task, all goals corrected at once",
         "paper",
-        "as seen",
+        "observed",
         (
             Moment("step 1", 0, 0.86),
             Moment("step 2", 1, 0.55),
@@ -118,7 +118,7 @@ def _draw(name: str, strip: Strip) -> None:
     seen = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(0.0, 0.0)), SEED)
     raw = apply_method("uncorrected", seen, None).plan
     corrected = apply_method(strip.method, seen, None).plan
-    assert raw is not None, "everything was seen"
+    assert raw is not None, "every operation is observed"
     assert corrected is not None, f"{strip.method} corrects {name}"
     failed, right = (_watched(scene, each, shown.layout.poses) for each in (raw, corrected))
     pictures = [(strip.failure, failed[1][-1][1]), *((m.caption, _state(right, m)) for m in strip.moments)]
@@ -135,7 +135,7 @@ def _draw(name: str, strip: Strip) -> None:
 
 
 def _watched(scene: Scene, plan: Plan, reference: Array) -> tuple[ReplayResult, list[tuple[float, Array]]]:
-    """A replay, with time [s] and joint positions of every look at it."""
+    """Replay a plan; return the result, and time [s] and joint positions every 20 ms."""
     states: list[tuple[float, Array]] = []
 
     def watch(data: Any) -> None:
@@ -152,12 +152,12 @@ def _state(watched: tuple[ReplayResult, list[tuple[float, Array]]], moment: Mome
 
 
 def _camera(goals: Array) -> SceneCamera:
-    """Looks at the middle of all places where something is put, across the assembly, from the side off the arm."""
+    """Return a camera at the middle of all target poses, across the assembly, from the side off the arm."""
     low = goals[:, :3, 3].min(axis=0)
     high = goals[:, :3, 3].max(axis=0)
     turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))
     far = 0.42 + 0.7 * float(np.linalg.norm(high - low))
-    return camera_view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
+    return aim_camera(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene.render import aim_camera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import simulate_demonstration
 
@@ -21,8 +21,7 @@ SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
 SIZE = (600, 500)
 COLUMNS = 5
 SEED = 0
-AZIMUTH_DEG = {"wedge_under_roof": -35.0}
-"""From where it is looked at, if not from the usual side."""
+AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, if not the usual side
 
 
 def main() -> None:
@@ -38,7 +37,7 @@ def main() -> None:
 
 
 def finished(name: str) -> NDArray[np.uint8]:
-    """What stands on the table when a careful person is done, as large as it fits."""
+    """Return a picture of the finished assembly, as large as it fits."""
     scene = build_scene(load_scenario(name))
     scene.shown.model.vis.headlight.ambient[:] = 0.4
     simulated = simulate_demonstration(scene, 0.0, SEED)
@@ -48,7 +47,7 @@ def finished(name: str) -> NDArray[np.uint8]:
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     extent = float(np.linalg.norm(at.max(axis=0) - at.min(axis=0)))
     azimuth = AZIMUTH_DEG.get(name, 128.0)
-    return picture(scene, poses, *SIZE, camera_view(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
+    return draw_picture(scene, poses, *SIZE, aim_camera(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
 
 
 if __name__ == "__main__":

@@ -33,12 +33,12 @@ def main() -> None:
     shots = [
         shot(with_ur5e, Plan(seen.assembly, seen.start, goals), shown.layout.poses, *told)
         for goals, told in (
-            (seen.poses, ("As seen: it jams", "the end of the stick\nmeets the faces", JAMS)),
-            (corrected, ("Corrected by contacts: it fits", "0.25 mm of play\non each side", FITS)),
+            (seen.poses, ("Observed poses: it jams", "the end of the stick\nmeets the faces", JAMS)),
+            (corrected, ("Corrected by contacts: it fits", "0.25 mm clearance\non each side", FITS)),
         )
     ]
     draw_top(shots, HERE / "top.png")
-    panels = [poses_panel("observed", seen, seen.poses, 3), poses_panel("corrected by contact", seen, corrected, 3)]
+    panels = [poses_panel("observed", seen, seen.poses, 3), poses_panel("corrected by contacts", seen, corrected, 3)]
     draw_poses(scene.scenario, 3, panels, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")

@@ -12,7 +12,7 @@ import apo_bench
 PACKAGE = Path(apo_bench.__file__).parent
 IMPURE = (
     *("simulation", "mjcf", "trial", "testing", "envs", "viz", "cli"),
-    *("benchmark.sweeps", "benchmark.scoring", "benchmark.datasets", "importers.assembly"),
+    *("benchmark.evaluation", "benchmark.sweeps", "benchmark.scoring", "benchmark.datasets", "importers.assembly"),
 )
 """Packages that import a simulator, directly or through another."""
 

@@ -110,5 +110,5 @@ class ReplayResult:
     """Each step that was finished, with the simulated time at which it was over, [s]."""
     in_hand: tuple[InHand, ...] = ()
     """Of each operation whose part was grasped; no controller reads it."""
-    felt: ProbingResult | None = None
+    probing: ProbingResult | None = None
     """None of a robot that does not feel."""

@@ -51,7 +51,8 @@ def arm_check(
     from apo_bench.simulation.arm_checks.arm_check import check_arm
     from apo_bench.simulation.arms.finding import find_arm
     from apo_bench.viz.arm_picture import draw_arm
-    from apo_bench.viz.arm_text import check_lines
+    from apo_bench.viz.arm_text import arm_check_form
+    from apo_bench.viz.form_text import fact_lines
 
     check_output(out, "--out", ".png")
     task = load_scenario(scenario)
@@ -59,5 +60,5 @@ def arm_check(
     checked = check_arm(arm, task, layouts)
     if out is not None:
         draw_arm(arm, task, out)
-    print_columns(check_lines(checked))
+    print_columns(fact_lines(arm_check_form(checked)))
     print_written(out)

@@ -59,7 +59,8 @@ def correct_command(
     from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.formats.observation import read_observation_file
     from apo_bench.viz.correct_text import POSE_COLUMNS, SUSPECT_COLUMNS, correction_form, correction_lines
-    from apo_bench.viz.tables import form_table
+    from apo_bench.viz.dof_text import DOF_COLUMNS, dof_rows
+    from apo_bench.viz.form_text import form_table
 
     check_output(out, "--out", ".json", ".csv", inputs=(observation,))
     method = method or (CORRECTOR if if_doubtful is None else "contact")
@@ -77,7 +78,7 @@ def correct_command(
         correction = correct(observed, corrector)
     explanation = _explain_solution(observed, correction)
     form = correction_form(task.name, method, observed, correction, explanation, assumed)
-    lines = correction_lines(correction, explanation)
+    lines = correction_lines(form, correction)
     moved, predicted_success = "", None
     if correction.ok:
         plan, moved, predicted_success = plan_correction(task, observed, correction)
@@ -89,11 +90,11 @@ def correct_command(
     if as_json:
         print_json(form | {"moved": moved or None, "predicted_success": predicted_success})
     else:
-        print_columns([("observation", f"{observation} of {task.name}, corrected by {method}"), *lines])
-        for rows, columns in (
-            (form["operations"], POSE_COLUMNS),
-            (form["test"] and form["test"]["suspects"], SUSPECT_COLUMNS),
-        ):
+        print_columns([("observation", str(observation)), *lines])
+        free = explanation and dof_rows(explanation)
+        suspects = form["test"] and form["test"]["suspects"]
+        tables = ((form["operations"], POSE_COLUMNS), (free, DOF_COLUMNS), (suspects, SUSPECT_COLUMNS))
+        for rows, columns in tables:
             if rows:
                 print_table(form_table(rows, columns))
     if out is not None and correction.ok:

@@ -11,6 +11,7 @@ from apo_bench.cli.shared import (
     DeviationMm,
     ScenarioArgument,
     path_option,
+    print_columns,
     print_json,
     print_table,
     takes,
@@ -41,7 +42,8 @@ def detect_contacts_command(
     from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.trial.detected_contacts import detect_by
     from apo_bench.trial.request import load_or_draw_observation
-    from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
+    from apo_bench.viz.detection_text import detection_form, evidence_table
+    from apo_bench.viz.form_text import fact_lines
 
     require_known("contact source", contact_source, DETECTED)
     with redirect_output(as_json):
@@ -51,10 +53,7 @@ def detect_contacts_command(
         print_json(form)
         return
     print_table(evidence_table(form), 140)
-    lines = [*confidence_lines(form), *difference_lines(form)]
+    typer.echo()
+    print_columns(fact_lines(form, ("schema", "contacts")))
     if assumed:
-        lines.append(assumed_deviations(deviation_mm, deviation_deg))
-    if not observed.observed.all():
-        missing = ", ".join(str(k + 1) for k, seen in enumerate(observed.observed) if not seen)
-        lines.append(f"no contact is detected at operations that were not observed: {missing}")
-    typer.echo("\n" + "\n".join(lines))
+        typer.echo(assumed_deviations(deviation_mm, deviation_deg))

@@ -22,7 +22,7 @@ def depth_command(
     noise_mm: Annotated[float, typer.Option(help="Standard deviation of one ray, in mm.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Number of the demonstration.")] = 0,
     human_error_scale: Annotated[float, typer.Option(help="Factor on the human error of the scenario.")] = 1.0,
-    view: Annotated[int, typer.Option(help="View of the depth camera in the picture, from 1.")] = 1,
+    view: Annotated[int, typer.Option(min=1, max=2, help="View of the depth camera in the picture.")] = 1,
     out: Annotated[Path | None, path_option("Draw every stage of the estimation into this file: .png.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -33,10 +33,9 @@ def depth_command(
       apo-bench inspect depth stick_in_tower --seed 7 --noise-mm 2 --out depth.png
     """
     from apo_bench.viz.depth_picture import draw_depth
-    from apo_bench.viz.depth_run import check_view, depth_form, depth_table, run_depth_camera
+    from apo_bench.viz.depth_run import depth_form, depth_table, run_depth_camera
 
     check_output(out, "--out", ".png")
-    check_view(view)
     run = run_depth_camera(scenario, noise_mm, seed, human_error_scale)
     form = depth_form(run, noise_mm, seed, human_error_scale)
     if out is not None:

@@ -39,14 +39,16 @@ def dof_command(
     from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, assumed_deviations
     from apo_bench.formats.observation import as_planned, read_observation_file
     from apo_bench.viz.dof_text import (
+        DOF_COLUMNS,
         PART_COLUMNS,
         count_directions,
         dof_form,
-        dof_lines,
+        dof_rows,
         hypothesis_forms,
         hypothesis_lines,
+        shared_lines,
     )
-    from apo_bench.viz.tables import form_table
+    from apo_bench.viz.form_text import form_table
 
     check_output(out, "--out", ".png")
     predicted_success = None
@@ -80,9 +82,9 @@ def dof_command(
         *([assumed_deviations(deviation_mm, deviation_deg)] if assumed else []),
         *([] if predicted_success is None else [f"predicted success {predicted_success:.2f}"]),
         *(f"hypothesis {line}" for line in hypothesis_lines(explanation.hypotheses)),
-        "",
-        *dof_lines(explanation),
+        *shared_lines(explanation),
     ]
     typer.echo("\n".join(lines))
+    print_table(form_table(dof_rows(explanation), DOF_COLUMNS))
     print_table(form_table(form["parts"], PART_COLUMNS))
     print_written(out)

@@ -48,7 +48,8 @@ def run_command(
     """
     from apo_bench.trial.request import Request, run_request
     from apo_bench.trial.rollout import Rollout
-    from apo_bench.viz.trial_text import summary_lines, trial_lines
+    from apo_bench.viz.form_text import fact_lines
+    from apo_bench.viz.trial_text import summary_lines
     from apo_bench.viz.viewing import choose_display
     from apo_bench.viz.viewing import view as step_through
 
@@ -69,7 +70,7 @@ def run_command(
     if as_json:
         print_json(record)
     else:
-        more = trial_lines(record) if verbose else []
+        more = fact_lines(record) if verbose else []
         print_columns([*summary_lines(record, scenario, observation), *more])
     replayed = record["sim_time_s"] is not None
     if not replayed and (video or view):

@@ -17,14 +17,16 @@ from apo_bench.cli.shared import (
     check_output,
     count_cores,
     path_option,
-    print_columns,
     print_json,
+    print_table,
     say,
 )
 from apo_bench.errors import InputError, require
 
 _OF_ESTIMATORS = "measured"
 """Track of a pose estimator where none is named."""
+_COLUMNS = {"track": "", "score": ".1f", "low": ".1f", "high": ".1f", "trials": "d", "executed": "d", "brier": ".3f"}
+"""Columns of the scores, with their formats."""
 
 
 def score_command(
@@ -62,7 +64,7 @@ def score_command(
     from apo_bench.benchmark.scoring.program import program_method
     from apo_bench.benchmark.scoring.score import score
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
-    from apo_bench.viz.score_text import entry_lines
+    from apo_bench.viz.form_text import form_table
 
     require((method is None) != (command is None), "name either METHOD or --command.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
@@ -97,6 +99,9 @@ def score_command(
     write_entry(entry, out)
     if as_json:
         print_json(form_of(entry))
-    else:
-        print_columns(list(entry_lines(entry)))
-    say(f"Entry: {out}", as_json)
+        return
+    print_table(form_table([form | {"track": track} for track, form in form_of(entry)["tracks"].items()], _COLUMNS))
+    if entry.overall is not None:
+        few = "; too few trials for a score (--quick)" if entry.quick else ""
+        typer.echo("all {:.1f} ({:.1f} to {:.1f})".format(*entry.overall) + few)
+    typer.echo(f"Entry: {out}")

@@ -41,11 +41,11 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
         f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
         "give a finite length per side that is not negative.",
     )
-    return receded_pieces(solid, clearance_m) if solid.fits else solid.pieces
+    return recede_pieces(solid, clearance_m) if solid.fits else solid.pieces
 
 
 @remembered
-def receded_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
+def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     """`physical_pieces` of a part that fits; among pieces other than boxes, a box is taken as one of them.
 
     By less than nothing they come forward.

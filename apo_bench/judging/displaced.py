@@ -30,7 +30,7 @@ def displacements(
     A part of revolution may have turned about its axis.
 
     Args:
-        away: Parts that are not looked at.
+        away: Parts that do not count.
     """
     for part, k in last_moves(assembly).items():
         put = after[k]
@@ -52,7 +52,7 @@ def faults_of_place(
     these, as they say where it belongs. A whole on a plain support may stand anywhere.
 
     Args:
-        away: Parts that are not looked at.
+        away: Parts that do not count.
         seen: The final poses, each part turned by the symmetry by which its contacts are judged.
     """
     last = last_moves(assembly)

@@ -7,7 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.planning.insertion.arrival import Arrival, OperationMacros, Preference, understand
+from apo_bench.planning.insertion.arrival import Arrival
+from apo_bench.planning.insertion.attach import Preference
+from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
 from apo_bench.scenario.layout import nominal_start
 from apo_bench.scenario.scenario import Scenario
 

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, copyable, freeze, pose
-from apo_bench.planning.insertion.arrival import Attach
+from apo_bench.planning.insertion.attach import Attach
 from apo_bench.records import Meaning, Thresholds
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, final
 from apo_bench.assembly import Plan, Step
 
 TICK_S = 0.02
-"""How often the arm looks for trouble and a film takes a picture."""
+"""How often the robot checks its state and a film takes a picture."""
 BY_HAND = "by hand"
 TOUCHING = "touch"
 """Phases with an empty hand: a demonstration, and a robot that probes before it picks anything."""

@@ -117,7 +117,7 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
         "peak_force_n": finite(result.peak_force_n),
         "grasp_slip": list(map(_slip, result.in_hand)),
         "sim_time_s": result.sim_time_s,
-    } | _probing(result.felt)
+    } | _probing(result.probing)
 
 
 def _probing(found: ProbingResult | None) -> TrialRecord:

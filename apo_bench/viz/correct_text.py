@@ -8,11 +8,14 @@ from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.formats.json_forms import covariance_form, pose_form
 from apo_bench.geometry import pose
-from apo_bench.viz.dof_text import count_directions, dof_form, dof_lines, hypothesis_forms, hypothesis_lines
+from apo_bench.viz.dof_text import dof_form, hypothesis_forms, hypothesis_lines
+from apo_bench.viz.form_text import fact_lines
 
 _SCHEMA = "apo-bench/correction/1"
 _TOO_GOOD = 1e-6  # with the stated noise no p-value is nearer to 1 ...
 _TESTED = 3  # ... if the test has at least so many degrees of freedom
+_TABLES = ("schema", "operations", "test", "test_after", "hypotheses", "explanation")
+"""Keys of a form that are not lines."""
 POSE_COLUMNS = {
     "operation": "d",
     "part": "",
@@ -34,20 +37,15 @@ SUSPECT_COLUMNS = {
 """Columns of the relations that may be wrong: keys of a suspect in `correction_form`, with their formats."""
 
 
-def correction_lines(correction: Correction, explanation: Explanation | None) -> list[tuple[str, str]]:
-    """Name and text of each line: how the correction ended, the gaps, the test, what is free."""
+def correction_lines(form: dict[str, Any], correction: Correction) -> list[tuple[str, str]]:
+    """Name and text of each line: the facts of `correction_form`, the test, the hypotheses."""
     contradictory = correction.status == "inconsistent"
-    facts = {
-        "result": [correction.sentence if correction.ok else f"{correction.status}: {correction.sentence}"],
-        "contact gap": [_describe_gaps(correction)],
-        "test": [_describe_test(correction.test, contradictory)],
-        "left out": [", ".join(correction.dropped)],
-        "test without": [_describe_test(correction.test_after, contradictory)],
+    more = {
+        "test": _describe_test(correction.test, contradictory),
+        "test_without": _describe_test(correction.test_after, contradictory),
         "hypotheses": hypothesis_lines(correction.hypotheses),
-        "contacts": [] if explanation is None else [count_directions(explanation)],
-        "free": [] if explanation is None else dof_lines(explanation),
     }
-    return [("" if i else name, text) for name, texts in facts.items() for i, text in enumerate(texts) if text]
+    return fact_lines(form, _TABLES) + fact_lines(more)
 
 
 def correction_form(
@@ -80,17 +78,9 @@ def correction_form(
     }
 
 
-def _describe_gaps(correction: Correction) -> str:
-    """The largest gap before and, of a correction that converged, after."""
-    known = np.isfinite(correction.gap_before_m)  # not with an operation that was not observed
-    before = f"{correction.gap_before_m * 1e3:.3f} mm observed" if known else "unknown in the observation"
-    of = ", with the relations that were left out" if correction.dropped else ""
-    return f"{before}, {correction.gap_after_m * 1e3:.3f} mm corrected{of}" if correction.ok else before
-
-
-def _describe_test(test: Consistency | None, contradictory: bool) -> str:
+def _describe_test(test: Consistency | None, contradictory: bool) -> str | None:
     if test is None:
-        return ""
+        return None
     names = [suspect.relation for suspect in test.ambiguous]
     who = f"; {'one of ' * (len(names) > 1)}{', '.join(names)} may be wrong" if names else ""
     verdict = "explained by the stated noise"

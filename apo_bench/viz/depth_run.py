@@ -4,10 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.depth_camera.follow import Event
-from apo_bench.perception.depth_camera.range_finder import RangeFinder
 from apo_bench.records import DEPTH_CAMERA, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene import build_scene
@@ -21,7 +19,7 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     stream,
 )
-from apo_bench.viz.tables import form_table
+from apo_bench.viz.form_text import form_table
 
 _SCHEMA = "apo-bench/depth/1"
 _COLUMNS = {
@@ -69,12 +67,6 @@ def run_depth_camera(scenario: str, noise_mm: float, seed: int, human_error_scal
     events = sensor.events(simulated.demonstration, images)
     models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
     return DepthRun(scene.scenario.name, simulated, simulated.images, images, events, models)
-
-
-def check_view(view: int) -> None:
-    """Refuse the number of a view, from 1, that the depth camera does not have."""
-    views = len(RangeFinder().views)
-    require(1 <= view <= views, f"--view must be from 1 to {views}, got {view}.")
 
 
 def depth_form(run: DepthRun, noise_mm: float, seed: int, human_error_scale: float) -> dict[str, Any]:

@@ -6,10 +6,9 @@ from typing import Any
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.perception.detection.evidence import DetectedContacts
 from apo_bench.trial.detected_contacts import count_contacts
-from apo_bench.viz.tables import form_table
+from apo_bench.viz.form_text import form_table
 
 _SCHEMA = "apo-bench/detected-contacts/1"
-_SURE = 0.9  # a set of contacts that is less likely is uncertain
 _COLUMNS = {
     "operation": "d",
     "manipulated": "",
@@ -29,26 +28,6 @@ def evidence_table(form: dict[str, Any]) -> Any:
     return form_table(form["contacts"], _COLUMNS)
 
 
-def difference_lines(form: dict[str, Any]) -> list[str]:
-    """How the detected contacts differ from those of the scenario."""
-    right = form["contacts_true_positive"]
-    whole = right + form["contacts_false_negative"]
-    line = f"{right} of the {whole} contacts of the scenario are detected, and {form['contacts_false_positive']} others"
-    return [line, *(f"missed: {c['operation']}: {c['manipulated']} on {c['environment']}" for c in form["missed"])]
-
-
-def confidence_lines(form: dict[str, Any]) -> list[str]:
-    """How probable the set of contacts is, and what the next best one would change; nothing without a comparison."""
-    if form["probability"] is None:
-        return []
-    doubt = "uncertain: " * (form["probability"] < _SURE)
-    line = f"{doubt}this set of contacts is right with probability {form['probability']:.2f}, of those compared"
-    if form["next"] is not None:
-        change = [f"{word} {', '.join(form['next'][word])}" for word in ("with", "without") if form["next"][word]]
-        line += f"; the next ({form['next']['probability']:.2f}) is {' and '.join(change)}"
-    return [line]
-
-
 def detection_form(
     scenario: str, contact_source: str, observation: Observation, detected: DetectedContacts, assumed: bool
 ) -> dict[str, Any]:
@@ -63,6 +42,7 @@ def detection_form(
         "scenario": scenario,
         "contact_source": contact_source,
         "deviation_assumed": assumed,
+        "unobserved": [k + 1 for k, seen in enumerate(observation.observed) if not seen],
         "contacts": [
             _contact_form(each.made, each.contact)
             | {

@@ -1,7 +1,7 @@
 """The free directions of every part, drawn as arrows on the finished assembly."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,80 +12,77 @@ from apo_bench.geometry import Array, Solid, extent
 from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, build_scene, camera_view, picture, pixels
+from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, aim_camera, build_scene, draw_picture, pixels
 from apo_bench.viz.dof_text import format_deviation
 from apo_bench.viz.panels import Color, Panel, PanelLine, draw_panels
 
 _SIZE = (900, 540)
 _ARROW_M = 0.038  # length of an arrow
-_AWAY_M = 0.006  # how far from its part an arrow begins
+_AWAY_M = 0.006  # from a part to its arrows
 _GRAY = (0.45, 0.45, 0.45)
 _AZIMUTH_DEG = 230.0
 _ELEVATION_DEG = -33.0
-_LOW = 0.3  # how high on its part a ring lies, from its lower end along the axis
-_SHADE = 0.8  # arrows are that much darker than their part
-
-
-class _DrawnPart(NamedTuple):
-    """A part, where it stands at the end, and what is free of the operation that last put it down by itself."""
-
-    solid: Solid
-    pose: Array
-    color: Color
-    operation: OperationExplanation
+_LOW = 0.3  # height of a ring on its part, as a share of the part's length along the axis
+_SHADE = 0.8  # an arrow has so much of the brightness of its part
 
 
 @default_looks()
 def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
-    """Write a PNG picture.
+    """Write a PNG picture, with a sentence for each part below.
 
     Raises:
-        InputError: There is nothing to draw with, or the file cannot be written.
+        InputError: Nothing here can draw, or the file cannot be written.
     """
-    own = {o.part: o for o in explanation.operations}
-    drawn = [
-        _DrawnPart(scenario.assembly.solids[of.part], of.pose, scenario.colors.get(of.part, _GRAY), own[of.part])
-        for of in explanation.parts
-        if of.part in own
-    ]
+    own = {operation.part: operation for operation in explanation.operations}
     poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
     first = explanation.poses[0]
     azimuth = float(np.degrees(np.arctan2(first[1, 0], first[0, 0]))) + _AZIMUTH_DEG
-    camera = camera_view(*frame_parts(scenario.assembly, [poses], own), azimuth, _ELEVATION_DEG)
+    camera = aim_camera(*frame_parts(scenario.assembly, [poses], own), azimuth, _ELEVATION_DEG)
     # the horizontal direction towards the camera
     toward = -np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.0])
-    marks = [_mark(part, free.direction, toward) for part in drawn for free in part.operation.free]
+    marks = []
+    lines = []
+    for part in explanation.parts:
+        if part.part in own:
+            solid = scenario.assembly.solids[part.part]
+            color = scenario.colors.get(part.part, _GRAY)
+            marks += [_mark(solid, part.pose, color, free.direction, toward) for free in own[part.part].free]
+            lines.append(PanelLine(_describe(explanation, own[part.part]), color))
     scene = build_scene(scenario)
-    image = picture(scene, poses, *_SIZE, camera, Marks(marks))
+    image = draw_picture(scene, poses, *_SIZE, camera, Marks(marks))
     title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.poses)}"
-    figure = draw_panels(title, [Panel(image, [_line(explanation, part) for part in drawn])])
+    figure = draw_panels(title, [Panel(image, lines)])
     for mark in marks:
         _write_name(figure.axes[0], mark, pixels(mark.tips, camera, float(scene.shown.model.vis.global_.fovy), *_SIZE))
     save_figure(figure, out)
 
 
-def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
-    """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
-    R = part.pose[:3, :3]
-    at = part.pose[:3, 3]
-    r, g, b = (_SHADE * c for c in part.color)
+def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Array) -> Any:
+    """Arrows outside the part; of a turn a ring about its point, or about the middle where any point will do.
+
+    Args:
+        T: Pose of the part, (4, 4), world.
+    """
+    R = T[:3, :3]
+    at = T[:3, 3]
+    r, g, b = (_SHADE * c for c in color)
     axis = R @ direction.axis
-    low, high = extent(part.solid.pieces, direction.axis)
+    low, high = extent(solid.pieces, direction.axis)
     if not direction.turns:
-        middle = part.solid.bounds.mean(axis=0)
+        middle = solid.bounds.mean(axis=0)
         reach = high - direction.axis @ middle + _AWAY_M
         return ShiftArrows(R @ middle + at, axis, reach, reach + _ARROW_M, (r, g, b), str(direction))
     # on the axis of the turn, at a part of the way from the lower end of the solid along it
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
     # two unit vectors at right angles to the axis: rows of V^T that belong to no singular value
     across = np.linalg.svd(direction.axis[None])[2][1:]
-    ends = np.array([extent(part.solid.pieces, v) for v in across]) - (across @ about)[:, None]
+    ends = np.array([extent(solid.pieces, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
     return TurnRing(R @ about + at, axis, toward, radius, (r, g, b), str(direction))
 
 
 def _write_name(axes: Any, mark: Any, tips: Array) -> None:
-    """At the lowest of the places, (k, 2), where the name of a mark may stand."""
+    """Write the name of a mark at the lowest of the places, (k, 2), where it may stand."""
     from matplotlib.patheffects import withStroke
 
     x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
@@ -94,9 +91,8 @@ def _write_name(axes: Any, mark: Any, tips: Array) -> None:
     axes.text(x, y, mark.name, ha="center", va="center", **look)
 
 
-def _line(explanation: Explanation, part: _DrawnPart) -> PanelLine:
-    """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
-    o = part.operation
+def _describe(explanation: Explanation, o: OperationExplanation) -> str:
+    """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; z fixed`."""
     groups = []
     for along, words in grouped(
         (free.along, f"{free.direction} ({format_deviation(free)})") for free in o.free
@@ -105,4 +101,4 @@ def _line(explanation: Explanation, part: _DrawnPart) -> PanelLine:
         groups.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
     if o.fixed:
         groups.append(f"{listed_words(o.fixed)} fixed")
-    return PanelLine(f"{o.part}: {'; '.join(groups)}", part.color)
+    return f"{o.part}: {'; '.join(groups)}"

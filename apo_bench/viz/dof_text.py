@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Hypothesis, spell
-from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation
+from apo_bench.correction.explanation import Explanation, FreeDirection
 from apo_bench.correction.relation_equations import RelationHold
-from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
 from apo_bench.geometry import Array
-from apo_bench.io import grouped, listed_words, with_article
+from apo_bench.io import grouped
 
 _SCHEMA = "apo-bench/explanation/1"
+DOF_COLUMNS = {"operation": "d", "part": "", "fixed": "", "free": "", "relations": "", "agreeing": ""}
+"""Columns of `dof_rows`, with their formats."""
 PART_COLUMNS = {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
 """How well each part is known at the end: keys of a part in `dof_form`, with their formats."""
-_OFF_M = 1e-6  # a turn about a point nearer to the origin of the part is about the origin
 
 
 def count_directions(explanation: Explanation) -> str:
@@ -26,10 +26,37 @@ def count_directions(explanation: Explanation) -> str:
     return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
-def dof_lines(explanation: Explanation) -> list[str]:
-    """One line for each operation (fixed by which parts, what is free), then one for each shared error."""
-    lines = [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_free(explanation, o)}" for o in explanation.operations]
-    return [*lines, *map(_shared, explanation.shared)]
+def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
+    """What is fixed and free of each operation, one object each, for a table with `DOF_COLUMNS`."""
+    rows = []
+    for o in explanation.operations:
+        free = []
+        for along, some in grouped((direction.along, direction) for direction in o.free).items():
+            names = ", ".join(f"{each.direction} {format_deviation(each)}" for each in some)
+            others = dict.fromkeys(explanation.operations[j].part for j in along)
+            free.append(f"{names}{' with ' * bool(others)}{', '.join(others)}")
+        until = {hold.relation: "" if hold.lost is None else f" until {hold.lost + 1}" for hold in o.through}
+        rows.append(
+            {
+                "operation": o.operation + 1,
+                "part": o.part,
+                "fixed": list(o.fixed),
+                "free": "; ".join(free) or "nothing",
+                "relations": [relation + end for relation, end in until.items()],
+                "agreeing": [hold.relation for hold in o.agreeing],
+            }
+        )
+    return rows
+
+
+def shared_lines(explanation: Explanation) -> list[str]:
+    """`camera: off by (-0.30 ± 0.50, 1.90 ± 0.30, 0.10 ± 0.40) mm and (..) deg`, for each shared error."""
+    lines = []
+    for estimate in explanation.shared:
+        numbers = zip(estimate.twist * TO_MM_DEG, estimate.deviations * TO_MM_DEG, strict=True)
+        each = [f"{x:.2f} ± {s:.2f}" for x, s in numbers]
+        lines.append(f"{estimate.error.name}: off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg")
+    return lines
 
 
 def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
@@ -106,42 +133,6 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
         }
         for each in hypotheses
     ]
-
-
-def _shared(estimate: SharedEstimate) -> str:
-    """`camera: off by (-0.30 ± 0.50, 1.90 ± 0.30, 0.10 ± 0.40) mm and (..) deg, in its frame`."""
-    numbers = zip(estimate.twist * TO_MM_DEG, estimate.deviations * TO_MM_DEG, strict=True)
-    each = [f"{x:.2f} ± {s:.2f}" for x, s in numbers]
-    frame = "in the frame of the part" if estimate.error.frame is None else "in its frame"
-    return f"{estimate.error.name}: off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
-
-
-def _fixed(o: OperationExplanation) -> str:
-    if not o.through:
-        return "no contact fixes anything"
-    others = dict.fromkeys(part for hold in o.through for part in sorted(hold.parts) if part != o.part)
-    names = [hold.relation + ("" if hold.lost is None else f" until operation {hold.lost + 1}") for hold in o.through]
-    agreeing = [hold.relation for hold in o.agreeing]
-    agrees = f"; {listed_words(agreeing)} agree{'s' * (len(agreeing) == 1)}" if agreeing else ""
-    return f"{', '.join(o.fixed)} fixed by {listed_words(map(with_article, others))} ({', '.join(names)}{agrees})"
-
-
-def _free(explanation: Explanation, o: OperationExplanation) -> str:
-    """Free directions, those that need the same other parts together."""
-    groups = []
-    for along, some in grouped((free.along, free) for free in o.free).items():
-        others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
-        alone = "chosen" if o.operation in explanation.left_out else "kept as observed"
-        how = f"together with {listed_words(others)}" if along else alone
-        names = ", ".join(f"{free.direction}{_about(free)}" for free in some)
-        groups.append(f"{names} free, {how}, {', '.join(map(format_deviation, some))}")
-    return "; ".join(groups) or "nothing is free"
-
-
-def _about(free: FreeDirection) -> str:
-    """The point of a turn, if it is not the origin of the part."""
-    is_off = free.direction.turns and np.abs(free.direction.point).max() >= _OFF_M
-    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in free.direction.point)}) mm" if is_off else ""
 
 
 def _deviation(free: FreeDirection) -> float:

@@ -10,16 +10,15 @@ from apo_bench.geometry import Array
 from apo_bench.io import default_looks, save_figure
 from apo_bench.perception.observation.models import MeasuredNoise, Residuals
 
-_SEEN = "#9fb8d1"
+_OBSERVED = "#9fb8d1"
 _FITTED = "#a6341b"
 _BINS = 40
-_SHOWN = 0.995
-"""Bins of a histogram, and up to which quantile it is drawn."""
+_SHOWN = 0.995  # quantile up to which a histogram is drawn
 
 
 @default_looks()
 def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
-    """Write the picture as PNG: across the ray, along it, turns; above, histograms; below, quantiles."""
+    """Write a PNG picture: across the ray, along it, turns; above, histograms; below, quantiles."""
     from matplotlib.figure import Figure
 
     upright = residuals.upright
@@ -33,36 +32,34 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     figure = Figure(figsize=(11.0, 6.6), layout="constrained")
     axes = figure.subplots(2, 3)
     for column, (name, sizes, cdf, limit) in zip(axes.T, columns, strict=True):
-        _histogram(column[0], name, sizes, cdf, limit)
-        _quantiles(column[1], name, sizes, cdf, limit)
+        _draw_histogram(column[0], name, sizes, cdf, limit)
+        _draw_quantiles(column[1], name, sizes, cdf, limit)
     axes[0, 0].set_ylabel("density")
-    axes[1, 0].set_ylabel("seen")
+    axes[1, 0].set_ylabel("observed")
     axes[0, 0].legend(frameon=False)
-    source = measured.source if len(measured.source) <= 110 else measured.source[:107] + "..."
     rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
-    figure.suptitle(f"{source}\n{int(upright.sum())} inliers that are not turned; {rates}", fontsize=11)
+    title = f"{measured.source[:110]}\n{int(upright.sum())} inliers that are not turned; {rates}"
+    figure.suptitle(title, fontsize=11)
     save_figure(figure, path, dpi=120)
 
 
-def _histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+def _draw_histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
     top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
-    edges = np.linspace(0.0, top, _BINS + 1)
     # a density of all sizes, also of those beyond the last bin: each counts 1 / (n * width of a bin)
-    axis.hist(sizes, edges, weights=np.full(len(sizes), _BINS / (top * len(sizes))), color=_SEEN, label="seen")
+    weights = np.full(len(sizes), _BINS / (top * len(sizes)))
+    axis.hist(sizes, np.linspace(0.0, top, _BINS + 1), weights=weights, color=_OBSERVED, label="observed")
     # the fitted density is the slope of its distribution
     fine = np.linspace(0.0, top, 401)
     axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=_FITTED, label="fitted")
     axis.set(xlim=(0.0, top), xlabel=name)
-    axis.spines[["top", "right"]].set_visible(False)
 
 
-def _quantiles(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
-    """Every seen size against the one that the fit has at its rank; on the line they are alike."""
+def _draw_quantiles(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+    """Every observed size against the fitted one at its rank; on the line they are equal."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
-    chance = np.maximum.accumulate(cdf(grid))
-    # the i-th of n sizes has the share (i - 1/2) / n below it; where the fit has that share is read backwards
+    # the i-th of n sizes has the share (i - 1/2) / n below it; the fitted size with that share is read off backwards
     rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
+    fitted = np.interp(rank, np.maximum.accumulate(cdf(grid)), grid)
     axis.plot([0.0, limit], [0.0, limit], color=_FITTED, linewidth=1.0)
-    axis.plot(np.interp(rank, chance, grid), np.sort(sizes), ".", color="#33557a", markersize=3)
+    axis.plot(fitted, np.sort(sizes), ".", color="#33557a", markersize=3)
     axis.set(xlim=(0.0, limit), ylim=(0.0, limit), aspect="equal", xlabel=f"fitted, {name}")
-    axis.spines[["top", "right"]].set_visible(False)

@@ -1,4 +1,4 @@
-"""What `apo-bench noise fit` found: as JSON, as lines, and as notes of a noise file."""
+"""A fitted noise model as one JSON object, as lines, and as notes of a noise file."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,15 +9,16 @@ from apo_bench.geometry import Array
 from apo_bench.io import columns
 from apo_bench.perception.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, Split
+from apo_bench.viz.form_text import fact_lines
 
 _SCHEMA = "apo-bench/noise-fit/2"
 _RARE = 0.01
 _NOTED = ("parts", "images", "distance_mm", "found", "left_over", "turned", "turned_and_off", "round_objects")
-"""What of a fit stands in the notes of a noise file."""
+"""Keys of a form that the notes of a noise file state."""
 
 
 def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
-    """Everything that was counted and fitted: mm and degrees; degrees of freedom are null for a Gaussian."""
+    """The JSON object of all counts and fits: mm and degrees; degrees of freedom are null for a Gaussian."""
     inlier = residuals.inlier
     turned = inlier & ~residuals.upright
     shift = residuals.shift_mm[residuals.upright]
@@ -63,15 +64,14 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 
 
 def fit_lines(form: Mapping[str, Any]) -> list[str]:
-    """A form of `fit_form` to be read, line by line."""
-    left_out = ("schema", "percentiles", "fit")
-    facts = [(_name(key), _say(value)) for key, value in form.items() if key not in left_out]
-    lines = [*columns([fact for fact in facts if not fact[0].startswith("inlier ")]), ""]
-    lines.append(" " * 33 + "".join(f"{f'p{p}':>8}" for p in form["percentiles"]))
+    """A form of `fit_form` as lines."""
+    inliers = [key for key in form if key.startswith("inlier_")]
+    facts = fact_lines(form, ("schema", "percentiles", "fit", *inliers))
+    table = [("", "", *(f"p{p}" for p in form["percentiles"]))]
     for name, of in form["fit"].items():
         for head, word in ((f"{name} [{of['unit']}]", "observed"), ("", "fitted")):
-            lines.append(f"{head:25}{word:8}" + "".join(f"{value:8.2f}" for value in of[word]))
-    return [*lines, "", *_goodness_lines(form)]
+            table.append((head, word, *(f"{value:.2f}" for value in of[word])))
+    return [*columns(facts), "", *columns(table), "", *_goodness_lines(form)]
 
 
 def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
@@ -79,31 +79,17 @@ def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         "Level 1 is as measured: mm and degrees, Student t, none beyond the limit.",
         f"Inliers that are turned by more than {TURNED_DEG:g} deg are not fitted: symmetries are not known.",
-        *(f"{_name(key)}: {_say(form[key])}" for key in _NOTED),
+        *map(": ".join, fact_lines({key: form[key] if form[key] != [] else "none" for key in _NOTED})),
         *_goodness_lines(form),
     )
 
 
 def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
-    """How well each distribution fits."""
     return [
         f"{name}: Kolmogorov-Smirnov {of['kolmogorov_smirnov']:.3f}, by chance below "
         f"{of['kolmogorov_smirnov_by_chance']:.3f}"
         for name, of in form["fit"].items()
     ]
-
-
-def _name(key: str) -> str:
-    return key.replace("_", " ")
-
-
-def _say(value: Any) -> str:
-    """Numbers with four digits, lists with commas, objects with their keys."""
-    if isinstance(value, Mapping):
-        return ", ".join(f"{_name(key)} {_say(of)}" for key, of in value.items())
-    if isinstance(value, list):
-        return ("; " if value and isinstance(value[0], Mapping) else ", ").join(map(_say, value)) or "none"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _percentiles(values: Array) -> list[float]:

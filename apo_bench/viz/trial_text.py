@@ -1,9 +1,8 @@
-"""A trial as text: six lines that answer a person, and one line for every other number of its record."""
+"""The six lines of a trial that answer a person."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from apo_bench.records import SETTINGS, TrialRecord, probes
 from apo_bench.records.run.replay_command import replay_command
@@ -61,14 +60,6 @@ def summary_lines(record: TrialRecord, scenario: str, observation: Path | None =
     ]
 
 
-def trial_lines(record: TrialRecord) -> Iterator[Line]:
-    """One line for every other value of the record that is known."""
-    for column, name, text in _DETAILS:
-        value: Any = record.get(column)
-        if value is not None and value != []:
-            yield name, text.format_map(record) if isinstance(text, str) else text(value, record)
-
-
 def _describe_settings(record: TrialRecord) -> Iterator[str]:
     """`noise level 2`, `human error scale 1`, `seed 5`, then settings that differ from their default."""
     mm, deg = record["noise_mm"], record["noise_deg"]
@@ -104,86 +95,3 @@ def _decisive_line(record: TrialRecord) -> Line:
     except (KeyError, TypeError):  # another code, or its number is not known
         name, text = next((line for column, line in _OTHERWISE.items() if record.get(column) is not None), ("", ""))
         return name, text.format_map(record)
-
-
-def _list_attempts(attempts: Iterable[Mapping[str, Any]], _: TrialRecord) -> str:
-    return "; ".join(
-        f"after step {each['step']} {_brace(each['free'])} "
-        + ("did not converge" if each["gap_mm"] is None else f"leaves {each['gap_mm']:.3f} mm")
-        for each in attempts
-    )
-
-
-def _brace(operations: Iterable[int], _: Any = None) -> str:
-    """`{5,4,3}`, as the paper writes sets of operations."""
-    return "{" + ",".join(map(str, operations)) + "}"
-
-
-def _list_adjustments(adjustments: Iterable[Mapping[str, Any]], _: TrialRecord) -> str:
-    moved = ", ".join(f"operation {each['operation']} by {each['mm']:.1f} mm" for each in adjustments)
-    return f"{moved}, so that the plan fits"
-
-
-def _describe_prediction(predicted: Mapping[str, Any], _: TrialRecord) -> str:
-    size = "" if predicted.get("size_mm") is None else f", {predicted['size_mm']:.2f} mm"
-    return (
-        f"operation {predicted['operation']} fails: {predicted['code']}{size}" if predicted["fails"] else f"none{size}"
-    )
-
-
-def _describe_test(p: float, record: TrialRecord) -> str:
-    """`chi-square 31.2 of 13, p 0.003: not explained by the stated noise; one of R2, R4 may be wrong`."""
-    suspects = ", ".join(record["suspects"] or ())
-    return (
-        f"chi-square {record['chi_square'] or 0.0:.1f} of {record['chi_square_dof']}, "
-        f"{f'p {p:.2g}' if p else 'p < 1e-300'}: {'' if record['test_passes'] else 'not '}explained by the stated noise"
-        + f"; one of {suspects} may be wrong"
-        * bool(suspects)
-    )
-
-
-def _describe_slip(slips: Iterable[Mapping[str, Any]], record: TrialRecord) -> str:
-    """Of the operation that failed, else of the part that turned most."""
-    most = max(slips, key=lambda part: (part["operation"] == record["failure_operation"], part["deg"]))
-    return (
-        f"operation {most['operation']}: {most['carried_mm']:.2f} mm and {most['carried_deg']:.2f} degrees before the "
-        f"part was placed, {most['mm']:.2f} and {most['deg']:.2f} in all"
-    )
-
-
-_DETAILS: tuple[tuple[str, str, str | Callable[[Any, TrialRecord], str]], ...] = (
-    ("grasp", "scene", "{grasp} grasp, {clearance_mm:g} mm clearance, arm {arm}"),
-    ("tried_corrections", "attempts", _list_attempts),
-    ("corrected_operations", "corrected operations", _brace),
-    ("extra_operations", "extra operations", "{extra_operations} beyond each operation once"),
-    ("fit_adjustments", "fit adjustments", _list_adjustments),
-    ("failure_prediction", "predicted failure", _describe_prediction),
-    ("p_value", "consistency test", _describe_test),
-    ("dropped", "dropped", lambda names, _: ", ".join(names)),
-    ("least_overlap", "least overlap", "{least_overlap:.2f}"),
-    (
-        "loose_success",
-        "loose verdict",
-        lambda loose, _: "every contact is made" if loose else "not every contact is made",
-    ),
-    (
-        "pose_error_fixed_mm",
-        "pose error",
-        "{pose_error_fixed_mm:.3f} mm fixed by contacts, {pose_error_free_mm:.3f} mm free",
-    ),
-    (
-        "planned_error_fixed_mm",
-        "planned error",
-        "{planned_error_fixed_mm:.3f} mm fixed by contacts, {planned_error_free_mm:.3f} mm free",
-    ),
-    ("sim_time_s", "peak force", "{peak_force_n:.1f} N in {sim_time_s:.1f} simulated seconds"),
-    (
-        "probe_contacts",
-        "probing",
-        "base error {base_error_estimate_mm:.2f} mm and {base_error_estimate_deg:.2f} degrees (standard deviations "
-        "{base_error_std_mm:.2f} and {base_error_std_deg:.2f}) from {probe_contacts} contacts; "
-        "{probe_contacts_rejected} more were rejected",
-    ),
-    ("grasp_slip", "grasp slip", _describe_slip),
-)
-"""Column -> name and text of a line, if the column has a value."""

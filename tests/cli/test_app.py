@@ -281,7 +281,7 @@ def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixtu
         (("run", "stick_in_tower", "--arm", "ur5e"), "did you mean 'ur5e_primitive'"),
         (("run",), "SCENARIO"),
         (("inspect", "scene", "stick_in_tower", "--out", "/no/such/folder/a.xml"), "cannot be written"),
-        (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "0 trials"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "trials must be a whole number from 1"),
         (("report", "/no/such/folder"), "holds no sweep"),
         (("inspect", "graph", "pocket_table", "--out", "graph.pdf"), "ends in .svg or .png or .mmd"),
     ],

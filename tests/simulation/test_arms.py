@@ -19,7 +19,7 @@ from apo_bench.simulation.arms.gripper_file import read_gripper
 from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints
-from apo_bench.viz.arm_text import check_lines
+from apo_bench.viz.arm_text import arm_check_form
 
 ARMS = folder("assets") / "arms"
 UR5E = ((0.1625, 0, 90), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, 90), (0.0997, 0, -90), (0.0996, 0, 0))
@@ -144,7 +144,7 @@ def test_arm_check_says_in_numbers_what_the_arm_can_do() -> None:
     assert report.rest_error_mm < 0.01
     assert (report.margins_deg > 5.0).all()
     assert report.missing == ()
-    assert len(list(check_lines(report))) == 12
+    assert len(arm_check_form(report)) == 12
 
 
 def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -113,7 +113,7 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
         config=ExecutionConfig("near-contact", robot_error=error, probing=probing),
     )
     assert felt.verdict.success
-    assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
+    assert (felt.result.probing.touches, felt.result.probing.refused) == (15, 0)
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():
@@ -155,5 +155,5 @@ def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
     )
     assert not blind.verdict.success
     assert felt.verdict.success
-    assert felt.result.felt.touches == 7
-    assert felt.result.felt.refused == 0
+    assert felt.result.probing.touches == 7
+    assert felt.result.probing.refused == 0

@@ -16,8 +16,8 @@ from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
 from apo_bench.viz.correct_text import POSE_COLUMNS, correction_form, correction_lines
-from apo_bench.viz.detection_text import confidence_lines, detection_form, difference_lines, evidence_table
-from apo_bench.viz.tables import form_table
+from apo_bench.viz.detection_text import detection_form, evidence_table
+from apo_bench.viz.form_text import form_table
 from tests import scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
@@ -67,39 +67,6 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     json.dumps(form, allow_nan=False)
 
 
-def test_a_set_of_contacts_that_is_not_likely_is_called_uncertain() -> None:
-    observation = tower()
-    solids = list(observation.assembly.solids.values())
-    fewer = scenes.scene(solids, observation.assembly.operations[:2], scenes.stick_in_tower().goals[:2])
-    recognised = DetectedContacts(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
-
-    def said(recognised: DetectedContacts) -> list[str]:
-        return confidence_lines(detection_form("tower", "detected", observation, recognised, False))
-
-    (line,) = said(recognised)
-    assert line.startswith("uncertain: this set of contacts is right with probability 0.75")
-    assert "the next (0.25) is without 3: stick." in line
-    assert said(replace(recognised, probability=0.95, rival=None))[0].startswith("this set")
-    assert said(replace(recognised, probability=None)) == []
-
-
-def test_contacts_that_were_missed_are_named() -> None:
-    observation = tower()
-    every = tuple(evidence_of(r.contact, r.made) for r in observation.assembly.relations())
-    fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
-    forms = [
-        detection_form("tower", "detected", observation, recognised, False)
-        for recognised in (DetectedContacts(observation.assembly, every), DetectedContacts(fewer.assembly, every[:1]))
-    ]
-    assert difference_lines(forms[0]) == [
-        f"{len(every)} of the {len(every)} contacts of the scenario are detected, and 0 others"
-    ]
-    first, *missed = difference_lines(forms[1])
-    assert first.startswith(f"1 of the {len(every)} contacts")
-    assert len(missed) == len(every) - 1
-    assert missed[0].startswith("missed: 2: castle2.")
-
-
 def test_a_correction_is_said_with_how_far_it_moved_each_goal() -> None:
     observation = tower()
     form = correction_form("tower", "contact", observation, corrected(observation), None, False)
@@ -120,4 +87,4 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
     assert (form["gap_before_mm"], form["gap_after_mm"], form["operations"]) == (None, None, None)
     assert form["test"]["chi_square"] is None
     json.dumps(form, allow_nan=False)
-    assert dict(correction_lines(failed, None))["test"].endswith("the contacts contradict each other")
+    assert dict(correction_lines(form, failed))["test"].endswith("the contacts contradict each other")

@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
-from apo_bench.assembly.touching import facing
+from apo_bench.assembly.facing import facing
 from apo_bench.errors import InputError
 from apo_bench.geometry import physical_pieces
 from apo_bench.importers.assembly.posed import PosedPart

@@ -17,9 +17,14 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Observation, joint_covariance, project_round_faces
-from apo_bench.assembly.equations import equations
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import (
+    Assembly,
+    Observation,
+    contact_equations,
+    contact_pattern,
+    joint_covariance,
+    project_round_faces,
+)
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 from apo_bench.perception.detection.thresholds import CONTACT_SOFT_M
 
@@ -62,7 +67,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimat
     room = C + np.diag(np.tile(_ROOM**2, n))
     back = pose.inverse(seen.poses[:n])
     goals = begin
-    system = equations(assembly, seen.start, begin)
+    system = contact_equations(assembly, seen.start, begin)
     S = _softness(assembly, seen.play_m)
     xi = pose.log(back @ goals)
     for _ in range(_TURNS):
@@ -103,5 +108,5 @@ def _softness(assembly: Assembly, play_m: float) -> Array:
         for contact in operation.contacts:
             carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2
             each.append(CONTACT_SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
-    count = np.diff(pattern(assembly).begin)
+    count = np.diff(contact_pattern(assembly).begin)
     return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

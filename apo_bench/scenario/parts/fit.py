@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.errors import require_known
-from apo_bench.geometry import Face, RoundFace, Solid, receded_pieces
+from apo_bench.geometry import Face, RoundFace, Solid, recede_pieces
 from apo_bench.scenario.parts.agreement import check_receding
 
 
@@ -32,7 +32,7 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}
         flats = {name: replace(face, fit=name in names) for name, face in solid.faces.items()}
         walls = {name: replace(face, fit=name in names) for name, face in solid.rounds.items()}
-        pieces = receded_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
+        pieces = recede_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
     fitted = replace(
         solid,
         pieces=pieces,

@@ -66,9 +66,9 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     """Try an arm at the table of a scenario.
 
     Args:
-        layouts: How many layouts are looked at.
+        layouts: How many layouts are checked.
     """
-    missing = unsaid(arm)
+    missing = missing_data(arm)
     try:
         scene = build_scene(scenario, arm=arm)
     except InputError as error:
@@ -118,7 +118,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     )
 
 
-def unsaid(arm: Arm) -> list[str]:
+def missing_data(arm: Arm) -> list[str]:
     """What a file could say and does not, and what is wrong with the gripper that was measured."""
     missing = []
     if arm.limits.payload_kg is None:

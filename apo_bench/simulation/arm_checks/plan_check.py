@@ -33,7 +33,7 @@ _Refused = Literal["unreachable_start", "unreachable"]
 def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, ...]:
     """Every transfer of a plan as the arm of a scene would do it.
 
-    Of the usual arm, and of an `Arm` that was made without a description, only reach is looked at: predictions
+    Of the usual arm, and of an `Arm` that was made without a description, only reach is checked: predictions
     without an arm were tuned with that one.
 
     Args:

@@ -28,7 +28,7 @@ STRETCH_M = 0.15
 STAND_S = 0.3
 """How long the arm stands before it."""
 _RESTS_M = 2e-5  # the tip rests when it is this near to its command
-_LOOKS = 10  # the arm waits for that so often: weak joints swing behind
+_MOST_CHECKS = 10  # the arm waits for that so often: weak joints swing behind
 
 
 @final
@@ -83,7 +83,7 @@ def trace(robot: Robot, line: Trajectory) -> Array:
 
 
 def rise(robot: Robot, speed: float) -> None:
-    """Go to where errors are looked at, at a speed [m/s], and come to rest there."""
+    """Go to where errors are measured, at a speed [m/s], and come to rest there."""
     up = np.array(robot.T)
     up[0, 3] = max(up[0, 3], robot.arm.base[0] + _AHEAD_M)
     up[2, 3] = _HIGH_M
@@ -92,10 +92,10 @@ def rise(robot: Robot, speed: float) -> None:
     if np.abs(up - robot.T).max() > 0.0:
         trace(robot, smooth_trajectory(robot.T, up, speed))
     robot.wait(STAND_S)
-    looks = 0
-    while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
+    checks = 0
+    while checks < _MOST_CHECKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
         robot.wait(STAND_S)
-        looks += 1
+        checks += 1
 
 
 def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:

@@ -19,18 +19,17 @@ from apo_bench.simulation.arms.grooves import fill_grooves
 from apo_bench.simulation.arms.hands import check_names, find_pad, scale_drive
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import compile_model, load_model
-from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, is_soft, joint_inertia
 from apo_bench.simulation.arms.stated import model_files, speed_limits, stated_arm
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
-_FINGER_ARMATURE = (
-    1e-4  # [kg m^2], of finger joints that are neither damped nor geared: light links would rattle for ever
-)
-_FINGER_DAMPING = 0.02  # [Nm s/rad], of the same
+_FINGER_ARMATURE = 1e-4  # [kg m^2]
+_FINGER_DAMPING = 0.02  # [Nm s/rad]
+"""Of finger joints that are neither damped nor geared: their light links would rattle without end."""
 _COUPLED_SOLREF = (0.004, 1.0)  # of coupled fingers, as in the grippers that come with the benchmark
 _COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)  # of the same
-_UNSAID_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they give way by 1 mm to some newtons
+_DEFAULT_SOLREF = (0.02, 1.0)  # MuJoCo's default, with which they give way by 1 mm to some newtons
 _USUAL_FINGERS_MM_S = 50.0
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
@@ -114,7 +113,7 @@ def build_arm(description: ArmDescription) -> Arm:
     )
     if description.home_deg is None:
         arm = with_home(arm, description.base is not None)
-    own = _drive(spec, joints, felt_inertia(whole, joints, arm.home), drives, hand.actuators, description)
+    own = _drive(spec, joints, joint_inertia(whole, joints, arm.home), drives, hand.actuators, description)
     spec.compile()
     control = "own position actuators" if own else "position servos made from the model"
     scale = gripper.drive_scale
@@ -149,7 +148,7 @@ def mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescr
 def make_passive(spec: Any, joints: Sequence[str]) -> None:
     """Nothing falls, nothing of the arm touches itself or what it stands on, and fingers do not rattle or give way."""
     for equality in spec.equalities:
-        if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _UNSAID_SOLREF:
+        if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _DEFAULT_SOLREF:
             equality.solref[:] = _COUPLED_SOLREF
             equality.solimp[:] = _COUPLED_SOLIMP
     for body in spec.bodies[1:]:
@@ -197,7 +196,7 @@ def _drive(
     if torques is not None:
         drives.update({name: drives[name]._replace(torque=float(x)) for name, x in zip(joints, torques, strict=True)})
     names = [actuator.name for actuator in spec.actuators]
-    stiff = all(not is_soft(drives[name].stiffness, felt) for name, felt in zip(joints, inertia, strict=True))
+    stiff = all(not is_soft(drives[name].stiffness, J) for name, J in zip(joints, inertia, strict=True))
     if stiff and torques is None and all(name in names for name in joints):
         return True
     for actuator in list(spec.actuators):

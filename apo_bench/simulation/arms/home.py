@@ -12,21 +12,13 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame
 
 _AT = (-0.05, 0.0, 0.30)  # place of the waiting tip, [m]
-_TABLE = [
-    (-0.15, -0.25, 0.03),
-    (-0.15, 0.25, 0.3),
-    (0.2, 0.25, 0.03),
-    (0.2, -0.25, 0.3),
-]  # places of the tip, [m], at which there should be room
+_TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
+"""Places of the tip, [m], at which there should be room."""
 _TURNS = (-1.6, 0.0, 1.6)  # turns from the way it waits, [rad], at which there should be room
 _WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)  # ways it may wait, [rad]
 _MOST_PLACES = len(_TABLE) * len(_TURNS)
-_NEARER_M = (
-    -0.4,
-    -0.3,
-    -0.2,
-    -0.1,
-)  # places of a base behind the middle of the table, of an arm that reaches at most half
+_NEARER_M = (-0.4, -0.3, -0.2, -0.1)
+"""Places of a base behind the middle of the table, of an arm that reaches at most half of it."""
 _STANDS_M = (0.0, 0.1, 0.2)  # heights of such a base
 _TRIES = 40  # random starts of the search
 _QUICK_TRIES = 16  # as `_TRIES`, for each other place of the base

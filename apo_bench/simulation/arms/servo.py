@@ -2,7 +2,7 @@
 
 Of every joint one position actuator: as stiff as the inertia at the joint at home allows at one natural
 frequency, damped critically, limited by the torque of the joint. Gravity is compensated; the velocity of the path is
-fed forward by the robot (`Robot._lead`).
+fed forward by the robot (`feedforward_command`).
 """
 
 import math
@@ -53,7 +53,7 @@ def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
     return drives
 
 
-def felt_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
+def joint_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
     """(joints,), the inertia at each joint alone, [kg m^2]."""
     data = mujoco.MjData(model)
     at = [model.joint(name).id for name in joints]
@@ -77,14 +77,14 @@ def is_soft(stiffness: float, inertia: float) -> bool:
 
 def add_servos(spec: Any, joints: Sequence[str], inertia: Array, drives: Mapping[str, Drive]) -> None:
     """One position actuator for each joint, of the same name."""
-    for name, felt in zip(joints, inertia, strict=True):
-        kp = stiffness_for(float(felt))
+    for name, J in zip(joints, inertia, strict=True):
+        kp = stiffness_for(float(J))
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.gaintype = mujoco.mjtGain.mjGAIN_FIXED
         servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         # Torque kp (u - q) - kd dq on an inertia J: critical damping is kd = 2 sqrt(kp J).
         servo.gainprm[0] = kp
-        servo.biasprm[:3] = (0.0, -kp, -2.0 * math.sqrt(kp * float(felt)))
+        servo.biasprm[:3] = (0.0, -kp, -2.0 * math.sqrt(kp * float(J)))
         if math.isfinite(drives[name].torque):
             servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
             servo.forcerange[:] = (-drives[name].torque, drives[name].torque)

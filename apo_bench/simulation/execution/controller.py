@@ -68,7 +68,7 @@ def replay(
         sim_time_s=float(robot.data.time),
         timeline=tuple(execution.progress.timeline),
         in_hand=robot.slip_monitor.finished,
-        felt=None if execution.probing is None else execution.probing.estimate.found,
+        probing=None if execution.probing is None else execution.probing.estimate.found,
     )
     if keys and not refused and outcome.code != "time_limit":
         cache.end(keys[-1], result)

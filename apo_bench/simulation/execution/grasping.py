@@ -34,7 +34,7 @@ _MARGINS_M = (0.004, 0.003, 0.002)
 _GRID_M = 0.003
 """Candidates along a part, and looks along a stroke, are this far apart."""
 _SOME = (0, 1, 9, 73, None)
-"""So many places are looked at together."""
+"""So many places are checked in one call."""
 _END_M = 0.018
 """No grasp is nearer to the end of a long part: the pads still lie on it."""
 _MOST_LEFT_M = 0.1

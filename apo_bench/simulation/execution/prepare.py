@@ -61,7 +61,7 @@ class Move(NamedTuple):
 def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part stays with it.
 
-    Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
+    Cached: the plan check and the execution both need it.
 
     Args:
         spiral: Whether the robot searches for a hole where a motion into it is stopped.

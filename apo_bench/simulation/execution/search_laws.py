@@ -20,7 +20,7 @@ _SOFT = 0.02
 """How fast the speed ahead grows, [m/s^2]: what lost touch by a few hundredths of a millimetre comes back softly."""
 _YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N]: the arm pushes with some 100 N per mm, and faster it rattles."""
-_FELT_S = 0.01
+_AVERAGED_S = 0.01
 """Forces are averaged over this time: hard parts rattle."""
 _INNER_M = 0.0005
 """Inside this radius the spiral is slower: around its middle it would turn at once."""
@@ -28,13 +28,13 @@ _PATIENCE = 3.0  # a spiral ends after so many times the time that its length ta
 _DOWN_S = 1.0  # and this long for the way ahead
 
 
-class _Felt:
+class _PushFilter:
     """The force on the part, averaged: called once a physics step."""
 
     def __init__(self, guard: Guard, step_s: float) -> None:
         self._direction = guard.direction.tolist()
         self._step_s = step_s
-        self._averaged = LowPass(_FELT_S)
+        self._averaged = LowPass(_AVERAGED_S)
 
     def __call__(self, force: Sequence[float]) -> tuple[float, list[float]]:
         """How hard it is pushed back, [N], and the rest of the force, across, (3,), [N]."""
@@ -63,7 +63,7 @@ class Spiral:
         first = np.cross((0.0, 0.0, 1.0) if abs(guard.direction[2]) < 0.5 else (0.0, 1.0, 0.0), guard.direction)
         first /= np.linalg.norm(first)
         self._axes = np.array([first, np.cross(guard.direction, first)])
-        self._felt = _Felt(guard, step_s)
+        self._filtered = _PushFilter(guard, step_s)
         self._ahead = 0.0
         self._speed = 0.0
         self._angle = 0.0
@@ -81,7 +81,7 @@ class Spiral:
 
     def __call__(self, force: Sequence[float]) -> Array | None:
         """How far the tip moves from where it began, (3,), world, [m]; None at the end."""
-        push, across = self._felt(force)
+        push, across = self._filtered(force)
         side = math.hypot(*across)
         self.found = self._ahead > self.deep
         self._left = self._left - 1
@@ -105,14 +105,14 @@ class Easing:
         self.guard = guard
         self.length = length
         self.step_s = step_s
-        self._felt = _Felt(guard, step_s)
+        self._filtered = _PushFilter(guard, step_s)
         self._offset = np.zeros(3)
         self._ahead = 0.0
         self.stopped = False
 
     def __call__(self, force: Sequence[float]) -> Array | None:
         """How far the tip moves from where it began, (3,), world, [m]; None at the end."""
-        push, side = self._felt(force)
+        push, side = self._filtered(force)
         self.stopped = push > self.guard.newton
         if self.stopped or self._ahead >= self.length:
             return None

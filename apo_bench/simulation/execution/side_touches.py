@@ -30,7 +30,7 @@ _APART_M = 0.01
 """Places that are less far apart determine a tilt no better than feet do."""
 _ROOM_M = 0.001  # everything else stays so far away
 _STEP_M = 0.002  # places along the wall are so far apart
-_LOOKS_M = 0.004  # room is checked so often on the way down
+_CHECKED_M = 0.004  # on the way down room is checked at places this far apart
 
 
 class SideTouch(NamedTuple):
@@ -122,7 +122,7 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
     """Whether part and hand have room on the way straight down and to the wall, and the arm reaches there."""
     grip = t.grips[0]
     tip = place.T @ grip.T_part_tip
-    above = np.arange(0.0, t.safe, _LOOKS_M)[:, None] * UP
+    above = np.arange(0.0, t.safe, _CHECKED_M)[:, None] * UP
     aside = _ROOM_M * np.cross(UP, place.normal)
     into = (STAND_OFF_M + _ROOM_M) * place.direction
     whole = np.vstack([above + aside, above - aside, into + aside, into - aside])

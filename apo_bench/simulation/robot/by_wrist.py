@@ -127,7 +127,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
     with reading(robot, wrist):
         q = robot.q
         offset = np.zeros(6)
-        looked = offset
+        checked = offset
         J = _joint_turns(robot, q, about)
         passed = 0
         while (wanted := law(wrist.wrench(about + offset[:3]))) is not None:
@@ -138,9 +138,9 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
                 passed += 1
                 robot.servo_step(q, passed)
                 taken = wrist.take(robot.step_s)
-            far = np.abs(offset - looked)
+            far = np.abs(offset - checked)
             if far[:3].max() > _FAR_M or far[3:].max() > _FAR_RAD:
-                looked = offset
+                checked = offset
                 J = _joint_turns(robot, q, about + offset[:3])
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)

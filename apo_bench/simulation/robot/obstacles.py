@@ -19,7 +19,7 @@ from apo_bench.simulation.scene import Scene, World, part_pose
 
 NEAR_HELD_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
-_LOOKS = 100  # looks along a line
+_PLACES = 100  # places checked along a line
 _APART_M = (0.0002, 0.001)  # not closer together than the first, nor farther apart than the second
 _RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
@@ -90,9 +90,9 @@ def near_spans(
     if not _still(world, data, others):
         return [(0, n)]
     obstacles = [obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
-    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
-    near = _near(moving, obstacles, line, s[looks], near_m[len(held) > 1])
-    return _spans(near, looks, n, run_up_s, float(scene.physics.timestep_s))
+    places = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
+    near = _near(moving, obstacles, line, s[places], near_m[len(held) > 1])
+    return _spans(near, places, n, run_up_s, float(scene.physics.timestep_s))
 
 
 def clear(scene: Scene, data: Any, moving: Iterable[Moving], T: Array) -> bool:
@@ -103,9 +103,9 @@ def clear(scene: Scene, data: Any, moving: Iterable[Moving], T: Array) -> bool:
 def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float) -> _Flags:
     """(k,), at which places along the line something is near.
 
-    What turns is taken as the box around all that it sweeps, and nothing else is looked at.
+    What turns is taken as the box around all that it sweeps, and nothing else is checked.
     """
-    # Upright boxes first: only where the box around what moves meets the box around what rests are pieces looked at.
+    # Upright boxes first: only where the box around what moves meets the box around what rests are pieces compared.
     R = line.start[:3, :3]
     start = line.start[:3, 3]
     tips = start + s[:, None] * (line.end[:3, 3] - start)
@@ -134,9 +134,9 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
 
 
 def _apart(far: float) -> float:
-    """How far apart looks are along a line of this length, [m], as a part of it."""
+    """How far apart the checked places are along a line of this length, [m], as a part of it."""
     least, most = _APART_M
-    return min(max(far / _LOOKS, least), most) / max(far, least)
+    return min(max(far / _PLACES, least), most) / max(far, least)
 
 
 def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
@@ -154,14 +154,14 @@ def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
     return np.array([-reach, -reach, low[2] - off]), np.array([reach, reach, high[2] + off])
 
 
-def _spans(near: _Flags, looks: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:
+def _spans(near: _Flags, places: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:
     """Stretches that are near, begun earlier by the run-up, as one where little lies between."""
     run_up = round(run_up_s / step_s)
     shortest = round(_SHORTEST_S / step_s)
     spans: list[_Span] = []
     for i in map(int, np.flatnonzero(near)):
-        begin = int(looks[max(i - 1, 0)]) - run_up
-        end = int(looks[min(i + 1, len(looks) - 1)])
+        begin = int(places[max(i - 1, 0)]) - run_up
+        end = int(places[min(i + 1, len(places) - 1)])
         begin = 0 if begin < shortest else begin
         end = n if n - end < shortest else end
         if spans and begin - spans[-1][1] < shortest:

@@ -16,8 +16,8 @@ _KNOT_M = 0.03  # inverse kinematics is solved at least this densely along a lin
 _KNOT_RAD = 0.15  # and along a turn
 _SHORT_M = 0.01  # so short a line has one knot in its middle, any other two at least
 _SHORT_RAD = 0.05  # as `_SHORT_M`, of a turn
-_SPEED_LOOKS = 101
-"""Times at which the speed of joints is looked at."""
+_SPEED_TIMES = 101
+"""Times at which the speed of the joints is checked."""
 _CREEP_RAD_S = 2e-3
 """Dry friction is full above some such."""
 _FAR_M = 0.3  # spacing of knots where only the end counts
@@ -134,7 +134,7 @@ def limit_speed(
     )
     if knots is None:
         return line, None
-    t = np.linspace(0.0, 1.0, _SPEED_LOOKS)
+    t = np.linspace(0.0, 1.0, _SPEED_TIMES)
     # dq/dt = dq/d(t/seconds) / seconds, so a line that takes `ratio` times as long keeps the limit.
     speed = np.abs(np.gradient(CubicSpline(*knots)(line.progress(t)), t, axis=0)) / line.seconds
     ratio = float((speed / limit).max())

@@ -158,7 +158,7 @@ class Robot:
         """Take one physics step towards joint angles, [rad], with a velocity, [rad/s], fed forward.
 
         Args:
-            passed: How many steps have passed: after a tick the robot looks for trouble.
+            passed: How many steps have passed: after each tick the robot checks its state.
 
         Returns:
             The force on the part in the hand, (3,) world, [N].

@@ -109,7 +109,7 @@ class WristSensor:
         self._sum: Array = np.zeros(6)
         self._summed_s = 0.0
         self._clock_s = 0.0
-        self._felt: Array | None = None
+        self._filtered: Array | None = None
         self._readings: list[Array] | None = None
         self._hand = hand_load(scene.kinematics, scene.arm.opening_m)
         self._held: tuple[Load, ...] = ()
@@ -137,7 +137,7 @@ class WristSensor:
         self.hold(*self._held)
         self._sum = np.zeros(6)
         self._summed_s = self._clock_s = 0.0
-        self._felt = None
+        self._filtered = None
 
     def take(self, step_s: float) -> bool:
         """Take up what the last physics step left in the sensors; whether that made a reading."""
@@ -150,7 +150,7 @@ class WristSensor:
         self._sum[:] = 0.0
         self._summed_s = 0.0
         self._clock_s -= READING_S
-        self._felt = reading if self._felt is None else self._felt + self._part * (reading - self._felt)
+        self._filtered = reading if self._filtered is None else self._filtered + self._part * (reading - self._filtered)
         if self._readings is not None:
             self._readings.append(reading)
         return True
@@ -180,10 +180,10 @@ class WristSensor:
         Returns:
             (6,): [N] and [Nm], along world axes; zero before the first reading.
         """
-        if self._felt is None:
+        if self._filtered is None:
             return np.zeros(6)
         T = self._sensor()
-        out = (self._weights @ T[2, :3] + self._zero - self._felt).reshape(2, 3) @ T[:3, :3].T
+        out = (self._weights @ T[2, :3] + self._zero - self._filtered).reshape(2, 3) @ T[:3, :3].T
         f, t = out
         t += pose.hat(T[:3, 3] - about) @ f
         return np.asarray(out.ravel())

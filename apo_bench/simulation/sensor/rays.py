@@ -13,7 +13,7 @@ from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
 
 _AWAY_M = -5.0
-"""Hands are put this deep below the floor before anything is looked at."""
+"""Hands are put this deep below the floor before a picture is taken."""
 _FARTHEST_M = 100.0
 _NOWHERE_M = 1e4
 """Models that are not there are farther away than any ray goes."""
@@ -46,7 +46,7 @@ class Sight:
     """A scene as a camera meets it: the poses of the moment, and no hands.
 
     The simulated hands are balls without arms that stay where they let go. A person takes the hands out of the picture;
-    here they are left out of every picture. It has data of its own, so what is looked at stays as it is.
+    here they are left out of every picture. It has data of its own, so the state of the simulation stays as it is.
     """
 
     def __init__(self, world: World) -> None:

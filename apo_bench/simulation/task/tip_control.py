@@ -32,7 +32,7 @@ PERIOD_S = 0.05
 """From one action to the next: 20 Hz."""
 _YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N], as in a search."""
-_FELT_S = 0.01
+_AVERAGED_S = 0.01
 """Forces are averaged over this time."""
 _GAIN = 0.6  # [m/s^2]: how fast the approach gains speed in free air
 _SOFT = 0.02  # [m/s^2]: and after a first touch
@@ -93,7 +93,7 @@ class TipControl:
         self._guard = t.insert_n if t.into.level else t.place_n
         self._left = 0.0 if start.second is None else float(t.into.left or 0.0)
         self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
-        self._felt = LowPass(_FELT_S)
+        self._filtered = LowPass(_AVERAGED_S)
         self._force = robot.forces.net()
         self._speed = 0.0
         self._stopped: float | None = None
@@ -198,7 +198,7 @@ class TipControl:
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
         # What the linear kinematics of the last period left behind is made up for.
-        asked = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
+        wanted = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
         from_there = off[:3]
         moved = np.zeros(3)
         self._turn = np.clip(self._turn + turn, -_TURN_RAD, _TURN_RAD)
@@ -212,9 +212,9 @@ class TipControl:
         q = robot.q
         left = self._left - float(off[2])
         for _ in range(steps):
-            f = np.array(self._felt(self._force, dt))
+            f = np.array(self._filtered(self._force, dt))
             push = -float(f @ direction)
-            led = asked
+            advance = wanted
             yields = _YIELD * f
             if self.nominal:
                 side = math.sqrt(max(float(f @ f) - push * push, 0.0))
@@ -224,11 +224,11 @@ class TipControl:
                     from_there = self._off(robot.scene.kinematics.forward(q))[:3]
                     moved = np.zeros(3)
                     self._speed, self._stopped = 0.0, left
-                led = asked + self._ahead(left, push, side, dt) * direction
+                advance = wanted + self._ahead(left, push, side, dt) * direction
                 yields = yields + _YIELD * push * direction
-            moved = moved + dt * (led + yields)
+            moved = moved + dt * (advance + yields)
             left = self._left - float(from_there[2] + moved @ direction)
-            leads = turning + shifting @ led
+            leads = turning + shifting @ advance
             q = q + dt * (leads + shifting @ yields)
             self._passed += 1
             self._force = robot.servo_step(q, self._passed, leads)
@@ -236,7 +236,7 @@ class TipControl:
         self._at = from_there + moved @ self._R
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
-        push = -float(np.dot(self._felt.force, direction))
+        push = -float(np.dot(self._filtered.force, direction))
         self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
         here = left - self._pace.end
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)

@@ -20,7 +20,7 @@ from apo_bench.assembly import SharedError
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.viz.dof_text import dof_lines
+from apo_bench.viz.dof_text import shared_lines
 
 
 def shown(name: str, seed: int) -> Demonstration:
@@ -96,7 +96,7 @@ def test_what_is_known_of_the_camera_is_said() -> None:
         off = one.twist - true
         square.append(off @ np.linalg.solve(one.covariance + np.diag(np.repeat([1e-4, 2e-3], 3) ** 2), off))
     assert np.mean(square) < 12.0
-    assert any("camera: off by (" in sentence for sentence in dof_lines(found))
+    assert any("camera: off by (" in sentence for sentence in shared_lines(found))
 
 
 def test_a_shared_error_above_its_covariance_is_refused() -> None:

@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from apo_bench import Assembly, ContactCorrector, Observation
-from apo_bench.assembly import Contact, Operation, PartFace
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Contact, Operation, PartFace, contact_equations
 from apo_bench.geometry import Hull, pose, ways_out
 from apo_bench.geometry.penetration import intrusion
 from apo_bench.perception.detection.estimate import estimate
@@ -66,7 +65,10 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
         seen = seen_at(scene, 1, 1.0)
         estimated = estimate(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector(compiled=False)(seen)
-        assert np.abs(equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max() < 5e-4
+        assert (
+            np.abs(contact_equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max()
+            < 5e-4
+        )
         assert_allclose(estimated.goals, corrected.poses, atol=2e-2)
 
 

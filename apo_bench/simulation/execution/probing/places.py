@@ -33,7 +33,7 @@ _END_M = 1e-4  # shapes that end within this of the farthest end touch
 _OVER_M = 0.003
 """A wall is touched so high over its foot, with the lowest part of the fingers."""
 _LIFT_M = 0.12  # the hand comes straight down from so far above
-_LOOKS_M = 0.004  # its room is checked so often
+_CHECKED_M = 0.004  # its room is checked at places this far apart
 
 
 StandOff = Callable[[Array, Array], float]
@@ -203,7 +203,7 @@ def _lowest(boxes: Sequence[Box]) -> Array:
 
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
     """Whether the hand can come straight down to a pose that the arm reaches."""
-    lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
+    lifts = np.arange(0.0, _LIFT_M, _CHECKED_M)[:, None] * UP
     if gripper_depth(scene.kinematics, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
     above = scene.kinematics.inverse(translate(T, UP, _LIFT_M), np.array(scene.arm.home))

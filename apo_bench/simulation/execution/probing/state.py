@@ -92,18 +92,18 @@ class ProbingState:
         """The body Jacobian of the tip, (6, joints)."""
         return self._kinematics.jacobian(robot.q)
 
-    def learn(self, robot: Robot, felt: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
+    def learn(self, robot: Robot, touches: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
         """Update the estimate by touches; from now on commands compensate for it.
 
         Args:
-            felt: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
+            touches: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
                 that is estimated to be tilted the foremost corner touched.
             differ: Only what differs between the touches counts, which are of one wall: the fingers give way.
         """
         before = self.estimate
         for _ in range(_CORNERS):
-            touches = [self._cornered(touch, patch) for touch, patch in felt]
-            self.estimate = before.touch(*(_less_common(before, touches) if differ else touches))
+            cornered = [self._cornered(touch, patch) for touch, patch in touches]
+            self.estimate = before.touch(*(_less_common(before, cornered) if differ else cornered))
         left = self._error
         E = self.estimate.hand_eye
         tool = np.array(left.tool)

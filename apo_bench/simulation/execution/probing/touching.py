@@ -56,14 +56,14 @@ def probe_fixed_parts(robot: Robot, probing: ProbingState) -> None:
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
         those = places(probing.plan, robot.scene, partial(_stand_off, robot, probing))
-        felt = list[tuple[Touch, Array]]()
+        touches = list[tuple[Touch, Array]]()
         for place in those:
             try:
-                felt += _touch(robot, probing, place)
+                touches += _touch(robot, probing, place)
             except ExecutionAborted as aborted:
                 aborted.why = _room(robot, probing, place)
                 raise
-        probing.learn(robot, felt, differ=places is opposite_places)
+        probing.learn(robot, touches, differ=places is opposite_places)
 
 
 def _stand_off(robot: Robot, probing: ProbingState, T: Array, normal: Array) -> float:

@@ -1,0 +1,108 @@
+"""Import parts and assemblies from Python, as the commands `part import` and `assembly import` do."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from apo_bench.arguments import check_arguments
+from apo_bench.errors import require
+from apo_bench.scenario import Scenario, load_scenario
+
+
+@check_arguments
+def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None) -> tuple[Path, ...]:
+    """Make part files from a CAD file: find its faces, and cut its solids into convex pieces.
+
+    Args:
+        file: A file that ends in .step, .stp, .stl, .obj or .3mf; STEP needs the extra `cad`.
+        folder: Where the part files are written.
+        unit: Unit of the file: mm, in, m, cm, ft or um. Default: as the file states.
+
+    Returns:
+        The part files (.xml), which scenario files name; round faces are in a TOML file beside each.
+
+    Raises:
+        InputError: The file cannot be read, or a solid makes no part.
+    """
+    from apo_bench.importers.cad.importing import import_part as write_part
+    from apo_bench.importers.cad.importing import raw_solids
+    from apo_bench.importers.cad.solids.naming import part_name
+
+    source, target = Path(file), Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    written: dict[str, Path] = {}
+    for raw in raw_solids(source, unit)[1]:
+        name = part_name(raw.name, set(written))
+        written[name] = write_part(raw, name, target, source.name).path
+    return tuple(written.values())
+
+
+@check_arguments
+def import_assembly(
+    files: str | Path | Sequence[str | Path],
+    out: str | Path | None = None,
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    fixed: Sequence[str] = (),
+    order: Sequence[str] = (),
+    clearance_mm: float | None = None,
+    max_overlap_mm: float = 0.2,
+) -> Scenario:
+    """Make a scenario from CAD files: parts, contacts, an order, starts and grasps.
+
+    Args:
+        files: One file of several solids, or several files in one frame.
+        out: The scenario file (.toml); its parts are in a folder beside it. Default: `NAME.toml` in the current
+            folder, where NAME is that of the first file.
+        unit: Unit of the files: mm, in, m, cm, ft or um. Default: as they state.
+        up: The axis of the files that is up: x, y, z, -x, -y or -z. Default: z, or one that has an order.
+        fixed: Parts that stay where they are. Default: the largest of the lowest.
+        order: The moved parts in their order. Default: one that is found.
+        clearance_mm: Clearance per side between parts that fit. Default: what their faces leave.
+        max_overlap_mm: Largest depth to which parts may overlap in the files.
+
+    Returns:
+        The scenario; its file can be edited, and `load_scenario` reads it again.
+
+    Raises:
+        InputError: A file cannot be read, a solid makes no part, or the scenario file exists.
+        RuntimeError: There is no order in which the parts can be assembled.
+    """
+    from apo_bench.importers.assembly.from_cad import import_assembly as write_parts
+    from apo_bench.importers.assembly.posed import read_posed
+    from apo_bench.importers.assembly.upright import USUAL_MM, new_upright_scenario
+    from apo_bench.importers.assembly.writing import write_scenario
+
+    sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
+    require(sources, "no file was given; give a CAD file of several solids, or several files.")
+    target = Path(f"{sources[0].stem}.toml") if out is None else Path(out)
+    require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
+    require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
+    poses, _ = write_parts(sources, target.with_name(f"{target.stem}_parts"), unit)
+    usual = USUAL_MM if clearance_mm is None else clearance_mm
+    made = new_upright_scenario(read_posed(poses, []), up, tuple(fixed), usual, max_overlap_mm, list(order))
+    write_scenario(made, target, f"Assembly of {target.stem}", ", ".join(source.name for source in sources))
+    return load_scenario(target)
+
+
+@check_arguments
+def check_scenario(scenario: str | Path | Scenario, *, seeds: int = 5, fidelity: str = "full") -> tuple[str, ...]:
+    """Check a scenario from its syntax to trials in which the robot knows the true poses.
+
+    Args:
+        scenario: A scenario file, or a scenario that was read from one.
+        seeds: Trials that run; 0 runs none.
+        fidelity: As in `TrialConfig`.
+
+    Returns:
+        The faults, one sentence each; empty if there is none.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    from apo_bench.importers.assembly.checking import check_file
+
+    source = scenario.source if isinstance(scenario, Scenario) else Path(scenario)
+    require(source is not None, "a scenario was given that was not read from a file; give its file.")
+    assert source is not None
+    return tuple(str(finding.sentence) for finding in check_file(source, seeds, fidelity) if not finding.ok)
