@@ -23,7 +23,7 @@ def assembly_import(
     files: Annotated[
         list[Path],
         typer.Argument(
-            parser=parse_path, metavar="FILE...", help="A CAD file of several solids, or several files in one frame."
+            parser=parse_path, metavar="FILE", help="A CAD file of several solids, or several files in one frame."
         ),
     ],
     *,

@@ -22,7 +22,7 @@ def doctor_command() -> None:
       apo-bench doctor
       MUJOCO_GL=egl apo-bench doctor
     """
-    from apo_bench import build_scene, load_scenario
+    from apo_bench import build_scene, draw_picture, load_scenario
     from apo_bench.simulation.film.window import no_window
 
     lines = [("apo_bench", f"{__version__}, Python {platform.python_version()}, {platform.platform()}")]

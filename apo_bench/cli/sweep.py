@@ -33,7 +33,7 @@ def sweep_command(
     scenarios: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO...",
+            metavar="SCENARIO",
             help="Scenarios by name or file, or one sweep file.",
             autocompletion=completion("scenario"),
         ),
