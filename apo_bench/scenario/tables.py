@@ -87,7 +87,7 @@ class SiteTable(Table, frozen=True, kw_only=True):
 
 
 class HumanErrorTable(Table, frozen=True, kw_only=True):
-    """`[careless]`."""
+    """`[human_error]`."""
 
     operation: int
     along: Axis

@@ -91,7 +91,7 @@ class Split:
         return x, top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x)), end
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
-        """Errors (n, 3); what falls outside the limit is drawn anew."""
+        """Errors (n, 3); what falls outside the limit is drawn again."""
         kept = np.zeros((0, 3))
         while len(kept) < n:
             # Student t is a Gaussian over sqrt(chi-square(n) / n): one divisor for both directions across, one along.
