@@ -34,7 +34,7 @@ def assembly_import(
     up: Up = None,
     fixed: Fixed = None,
     order: Order = None,
-    clearance_mm: ClearanceMm = None,
+    clearance_mm: ClearanceMm = 0.25,
     max_overlap_mm: MaxOverlapMm = 0.2,
     overwrite: Overwrite = False,
 ) -> None:

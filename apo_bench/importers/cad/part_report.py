@@ -47,7 +47,6 @@ def report_part(part: ImportedPart) -> dict[str, Any]:
 def _report_face(part: ImportedPart, name: str, region: Region) -> dict[str, Any]:
     report: dict[str, Any] = {
         "kind": region.kind,
-        "residual_um": 1e3 * region.residual,
         "no_contact": part.refused.get(name),
         "share": part.shares.get(name, 1.0),
     }
