@@ -37,12 +37,12 @@ from apo_bench.simulation.arms.building import read_arm as read_arm
 from apo_bench.simulation.execution.controller import replay as replay
 from apo_bench.simulation.human.demonstration import demonstrate as demonstrate
 from apo_bench.simulation.scene.render import Film as Film
-from apo_bench.simulation.scene.render import camera_view as camera_view
-from apo_bench.simulation.scene.render import picture as picture
+from apo_bench.simulation.scene.render import aim_camera as aim_camera
+from apo_bench.simulation.scene.render import draw_picture as draw_picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
 from apo_bench.simulation.scene.show import show_scenario as show_scenario
-from apo_bench.trial.fitting import fitting_plan as fitting_plan
+from apo_bench.trial.fitting import fit_plan as fit_plan
 from apo_bench.trial.run import run_trial as run_trial
 
 __version__: str

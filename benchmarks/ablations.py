@@ -12,12 +12,20 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Correction, Observation, Operation, largest, largest_gap, placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import (
+    Assembly,
+    Correction,
+    Observation,
+    Operation,
+    contact_equations,
+    largest,
+    largest_gap,
+    placements,
+)
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.baselines.track import track_operations
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 from apo_bench.geometry import Array
 
@@ -49,9 +57,9 @@ def no_disappeared(observation: Observation) -> Correction:
     contacts that stand hold; the gaps are those of every contact ever made.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     standing = np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(without_lost(observation.assembly), ~(before <= observation.gap_m)[standing])
     solution = solve_newton(system.among(standing & system.containing(freed)), observation.poses, freed)
@@ -98,11 +106,11 @@ def no_history(observation: Observation) -> Correction:
         ever made. `freed` are the operations that got a new motion parameter.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
     poses = _poses(observation, tuple(last))
     end = _end(observation.assembly, tuple(last))
-    system = equations(end, observation.start, poses)
+    system = contact_equations(end, observation.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(free)), poses, free)
     status = solver_status(solution, largest(system.gaps(solution.poses)), observation.gap_m)

@@ -16,6 +16,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from apo_bench.assembly import contact_equations
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -24,7 +26,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from apo_bench import Correction, Observation, correct, correct_many
-from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Array, pose, right_jacobian
 from benchmarks.corrector_problems import observe, problem
 
@@ -56,7 +57,7 @@ def find_optimum(observation: Observation, begin: Array) -> Array:
     """Return the shortest z that closes all contacts, (6 n,); the search starts at `begin`."""
     n = len(observation.poses)
     L = np.linalg.cholesky(observation.covariance)
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
 
     def displace(z: Array) -> tuple[Array, Array]:
         xi = (L @ z.reshape(n, 6, 1))[..., 0]

@@ -1,10 +1,9 @@
-"""Whether the loaders of others read what `apo-bench dataset make` writes: `python benchmarks/dataset_loaders.py`.
+"""Read data sets of `apo-bench dataset make` with other loaders: `python benchmarks/dataset_loaders.py`.
 
-Replays and insertions are made here in every format, and read in environments made for it by pip: by LeRobot (with
-`--python312`, since it needs Python 3.12 or later; its PyTorch is some 5 GB), by Minari, and by mlcroissant. Each says
-what it found, compared with what PyArrow or h5py read here. LeRobot also trains a small policy and evaluates it, as the
-guide says. `--envs FOLDER` keeps the environments for the next time.
-Needs h5py: `pip install apo_bench[data]`.
+The script writes replays and insertions in every format, and reads them in virtual environments: with LeRobot
+(`--python312`, as it needs Python 3.12; 5 GB of PyTorch), and Minari. Each result is compared with that of
+PyArrow or h5py. LeRobot also trains a small policy and evaluates it, as in the guide. `--envs FOLDER` keeps the virtual
+environments. Needs h5py: `pip install apo_bench[data]`.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ MADE = {
 }
 NEEDS = {
     "lerobot": ("lerobot[dataset,training]", str(ROOT)),
-    "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]"),
+    "minari": ("minari[hdf5]", "pillow"),
 }
 LEROBOT = """
 import sys
@@ -80,19 +79,10 @@ right = data.filter_episodes(lambda episode: bool(episode.infos["success"][-1]))
 print(f"Minari {version('minari')}: {data.total_episodes} episodes, {steps} steps, {right.total_episodes} right, of",
       data.env_spec.id if data.env_spec else "no environment")
 """
-CROISSANT = """
-import logging, sys
-from importlib.metadata import version
-import mlcroissant
-logging.disable(logging.WARNING)
-data = mlcroissant.Dataset(jsonld=f"{sys.argv[1]}/croissant.json")
-read = [f"{sum(1 for _ in data.records(each.id))} of {each.id}" for each in data.metadata.record_sets]
-print(f"mlcroissant {version('mlcroissant')}: {len(data.metadata.distribution)} files and sets;", *read)
-"""
 
 
 def environment(folder: Path, python: str, needs: tuple[str, ...]) -> Path:
-    """The Python of an environment with these packages, made if it is not there."""
+    """Return the Python of a virtual environment with these packages; make it if it is missing."""
     made = folder / "bin" / "python"
     if not made.exists():
         subprocess.run([python, "-m", "venv", str(folder)], check=True)
@@ -117,8 +107,8 @@ def trains(python: Path, data: Path) -> None:
         ("lerobot-eval", f"{taken} {tried}"),
     ):
         alone = os.environ | {"PYTHONPATH": str(here), "HF_HUB_OFFLINE": "1", "HF_HOME": str(data.parent / "hub")}
-        told = [python.with_name(command), *words.split()]
-        done = subprocess.run(told, env=alone, cwd=here, capture_output=True, text=True)
+        command_line = [python.with_name(command), *words.split()]
+        done = subprocess.run(command_line, env=alone, cwd=here, capture_output=True, text=True)
         if done.returncode:
             sys.exit(f"{command} failed:\n{done.stderr[-2000:]}")
     overall = json.loads((here / "tried" / "eval_info.json").read_text(encoding="utf-8"))["overall"]
@@ -126,7 +116,7 @@ def trains(python: Path, data: Path) -> None:
 
 
 def reads(python: Path, program: str, folder: Path) -> None:
-    """Print what a loader says; end this program if it fails."""
+    """Print the output of a loader; end this program if it fails."""
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     alone |= {"HF_HUB_OFFLINE": "1", "HF_HOME": str(folder.parent / "hub")}
     done = subprocess.run([python, "-c", program, str(folder)], env=alone, capture_output=True, text=True)
@@ -136,10 +126,10 @@ def reads(python: Path, program: str, folder: Path) -> None:
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--envs", type=Path, help="a folder where environments are kept")
-    asked.add_argument("--python312", default="python3.12", help="Python 3.12 or later, for LeRobot")
-    given = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--envs", type=Path, help="a folder where environments are kept")
+    parser.add_argument("--python312", default="python3.12", help="Python 3.12 or later, for LeRobot")
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         here = Path(scratch)
         envs = (given.envs or here).resolve()
@@ -159,7 +149,6 @@ def main() -> None:
                         trains(lerobot, out)
                 if form == "minari":
                     reads(others, MINARI, out)
-                reads(others, CROISSANT, out)
 
 
 if __name__ == "__main__":

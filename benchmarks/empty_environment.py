@@ -1,8 +1,8 @@
-"""Whether a built package works where nothing else is installed: `python benchmarks/empty_environment.py dist/*.whl`.
+"""Check a built package in an empty virtual environment: `python benchmarks/empty_environment.py dist/*.whl`.
 
-In an environment made for it, with the Python that runs this, pip installs the package. From an empty folder every
-module is imported, a trial replayed, an environment made, measured poses corrected, and a small sweep has its report.
-With `--tests` the core of the tests is run there, too. It says how many packages came, and which are large.
+pip installs the package with the Python that runs this. In an empty folder the script imports every module, runs a
+trial, makes an environment, corrects measured poses, and runs a small sweep with its report. `--tests` runs the core of
+the tests there. The script prints the number of installed packages and the large ones.
 """
 
 from __future__ import annotations
@@ -22,16 +22,14 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ("geometry", "assembly", "correction", "judging", "simulation", "trial/test_trial.py")
-"""The tests of the rooms that hold the method."""
+"""Tests of the packages that hold the method."""
 TEST_TOOLS = ("pytest>=8", "hypothesis>=6.100")
 LARGE_MB = 50
-TIMES = 5
-"""So often the import is timed, in seconds of the processor; the least counts."""
-INSTALLERS = ("pip", "setuptools")
-"""They come with the environment."""
+TIMES = 5  # runs of the import, of which the fastest counts
+INSTALLERS = ("pip", "setuptools")  # part of every environment
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 OPTIONAL = ("build123d", "dm_env", "numba", "OCP", "pyarrow", "ray", "viser")
-"""What the extras bring; a module that needs one of these may say so."""
+"""Packages of the extras; a module that needs one of these may be missing."""
 IMPORT = f"""
 import importlib, pkgutil, sys, apo_bench
 assert apo_bench.__file__.startswith(sys.prefix), apo_bench.__file__
@@ -79,7 +77,7 @@ SWEEP = (
 
 
 class Installed(NamedTuple):
-    """A package that came along."""
+    """An installed package."""
 
     version: str
     mb: float
@@ -87,7 +85,7 @@ class Installed(NamedTuple):
 
 @dataclass(frozen=True)
 class EmptyEnvironment:
-    """An environment of Python in a folder, and an empty folder beside it in which its programs run."""
+    """A virtual environment, and an empty folder in which its programs run."""
 
     folder: Path
 
@@ -129,7 +127,7 @@ def install(made: EmptyEnvironment, bounds: Sequence[str], *packages: str) -> No
 
 
 def check(made: EmptyEnvironment) -> str:
-    """Use what is installed as a new user would; what was done, in words."""
+    """Use the installed package as a new user does; return what was done, in words."""
     modules = made.run("python", "-c", IMPORT).strip()
     row = json.loads(made.run("apo-bench", *TRIAL))
     if row["success"] is not True:
@@ -144,25 +142,25 @@ def check(made: EmptyEnvironment) -> str:
     return f"{modules} modules, a trial, an environment, a correction, a sweep and its report work"
 
 
-def check_by_tests(made: EmptyEnvironment, bounds: Sequence[str], rooms: Sequence[str]) -> str:
-    """Run tests of these rooms beside what is installed, not beside the sources; the last line of what they say."""
+def check_by_tests(made: EmptyEnvironment, bounds: Sequence[str], packages: Sequence[str]) -> str:
+    """Run tests of these packages on the installed package; return the last line of their output."""
     install(made, bounds, *TEST_TOOLS)
     for name in ("tests", "benchmarks", "docs", "assets", "scenarios", "pyproject.toml"):
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, made.here / name)
     options = ("-q", "-m", "not slow and not extras", "--override-ini", "addopts=--import-mode=importlib")
-    said = made.run("python", "-m", "pytest", *options, *(f"tests/{room}" for room in rooms))
-    return said.strip().splitlines()[-1]
+    output = made.run("python", "-m", "pytest", *options, *(f"tests/{package}" for package in packages))
+    return output.strip().splitlines()[-1]
 
 
 def sizes(made: EmptyEnvironment) -> str:
-    """How many packages came along, how large all are with this one, and how long the import takes."""
+    """How many packages are installed, how large all are with this one, and how long the import takes."""
     packages = made.packages()
     large = sorted(((name, each.mb) for name, each in packages.items() if each.mb > LARGE_MB), key=lambda one: -one[1])
     seconds = min(float(made.run("python", "-c", TIME)) for _ in range(TIMES))
     whole = sum(each.mb for each in packages.values())
     listed = ", ".join(f"{name} {mb:.0f}" for name, mb in large)
-    counted = f"{len(packages) - 1} packages came along, {whole:.0f} MB; above {LARGE_MB} MB: {listed}"
+    counted = f"{len(packages) - 1} packages are installed, {whole:.0f} MB; above {LARGE_MB} MB: {listed}"
     return f"{counted}; import apo_bench: {seconds:.2f} s"
 
 
@@ -170,15 +168,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("package", help="a wheel, an archive of sources, or a folder")
     parser.add_argument("--tests", action="store_true", help="run the core of the tests there, too")
-    asked = parser.parse_args()
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        made = empty_environment(Path(folder), str(Path(asked.package).resolve()))
+        made = empty_environment(Path(folder), str(Path(given.package).resolve()))
         counted = sizes(made)
         works = check(made)
         mujoco = made.packages()["mujoco"].version
         print(f"Python {sys.version.split()[0]}, MuJoCo {mujoco}: {works}", flush=True)
         print(counted, flush=True)
-        if asked.tests:
+        if given.tests:
             print(check_by_tests(made, (), CORE))
 
 

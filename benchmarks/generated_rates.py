@@ -27,7 +27,7 @@ from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.records import TrialConfig
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene.render import aim_camera, draw_picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
 from apo_bench.trial.stages import scene_of, simulate_demonstration
@@ -132,8 +132,8 @@ def draw(paths: Sequence[Path]) -> None:
         scenario = scene.scenario
         poses = placements(scenario.assembly, scenario.start, scenario.goals)[-1]
         middle = np.mean([poses[part][:3, 3] for part in scenario.assembly.fixed if part != TABLE], axis=0)
-        view = camera_view(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
-        views.append(picture(scene, poses, 300, 260, view))
+        view = aim_camera(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
+        views.append(draw_picture(scene, poses, 300, 260, view))
     imageio.imwrite(PICTURE, np.concatenate(views, axis=1))
 
 

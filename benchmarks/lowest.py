@@ -1,10 +1,8 @@
-"""Whether the package works with the oldest versions that `pyproject.toml` allows: `python benchmarks/lowest.py`.
+"""Check the package with the oldest versions that `pyproject.toml` allows: `python benchmarks/lowest.py` (minutes).
 
-In an environment made for it, pip installs this package, or the wheel or archive that is named, and of each dependency
-just the version that the bound names, of what those need the newest that fits. There it is used as a new user would
-([how](empty_environment.py)), with `--tests` also by the core of the tests. A few minutes, most of them for pip.
-
-Some of these versions are older than Python 3.13 and have no wheels for it: this is done with Python 3.11.
+In a virtual environment pip installs this package, or a wheel or archive, and of each dependency the version of its
+bound. `empty_environment.py` then uses the package as a new user does; `--tests` adds the core of the tests. Newer
+versions of Python lack wheels of the old versions, so this runs with Python 3.11.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("package", nargs="?", default=str(ROOT), help="a wheel, an archive of sources, or a folder")
     parser.add_argument("--tests", action="store_true", help="run the core of the tests there, too")
-    asked = parser.parse_args()
+    given = parser.parse_args()
     if sys.version_info[:2] != OLDEST:
         print(
             f"The oldest versions are tried with Python {OLDEST[0]}.{OLDEST[1]} only: newer ones lack wheels of them."
@@ -37,9 +35,9 @@ def main() -> None:
         return
     bounds = lowest(ROOT / "pyproject.toml")
     with tempfile.TemporaryDirectory() as folder:
-        made = empty_environment(Path(folder), f"{Path(asked.package).resolve()}[{','.join(EXTRAS)}]", bounds)
+        made = empty_environment(Path(folder), f"{Path(given.package).resolve()}[{','.join(EXTRAS)}]", bounds)
         print(f"{check(made)} with {', '.join(bounds)}")
-        if asked.tests:
+        if given.tests:
             print(check_by_tests(made, bounds, CORE))
 
 

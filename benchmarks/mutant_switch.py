@@ -1,4 +1,4 @@
-"""What is beside the package in a copy whose mutants are switched on one at a time, and a plugin of pytest there.
+"""Switch the mutants of a copy on, one at a time: a module of the copy and a plugin of pytest.
 
 The copy says `expression if not on(k) else mutant` at each place, so it is imported once for all mutants. First a fork
 runs every test and notes which mutants each reaches; what a cache or a fixture computed for one test counts for all
@@ -20,8 +20,7 @@ import pytest
 
 HERE = Path(__file__).parent
 LOG = HERE / "reached.log"
-LONGEST_S = 300
-"""Tests that have not ended by then have noticed: most such mutants never end."""
+LONGEST_S = 300  # tests that have not ended by then count as noticing: most such mutants never end
 PACKAGE_S, ALL_S = 20.0, 30.0
 """What the tests run for one mutant took together, quickest first: those of its package, then of all packages."""
 
@@ -216,7 +215,7 @@ def alone(number: int, items: Sequence[pytest.Item]) -> int:
 
 
 def forked(work: Callable[[], int], longest_s: float | None) -> dict[str, Any]:
-    """Do it in a process of its own, with all that it starts, and say whether it returned 0."""
+    """Run a function in a fork, with all that it starts; return whether it returned 0."""
     (HERE / "by").write_text("")
     began = time.monotonic()
     process = os.fork()

@@ -1,9 +1,8 @@
-"""Runs a command again under other kernels of OpenBLAS, NumPy and Numba: `python -m benchmarks.switches COMMAND...`.
+"""Run a command under other kernels of OpenBLAS, NumPy and Numba: `python -m benchmarks.switches COMMAND...`.
 
-All three choose their code by what the processor can do, so results differ between processors in their last bits. A
-switch is used only where a process under it says that it took; one that the processor does not allow is named and left
-out. The command finds in APO_BENCH_KERNELS what it runs on, and `expected` asks whether it does. Without a command: the
-kernels in use here, as JSON.
+All three choose their code by the processor, so results differ between processors in their last bits. A switch counts
+only where a process under it confirms it; one that the processor does not allow is printed and left out. The variable
+APO_BENCH_KERNELS names the expected kernels for the command. Without a command: the kernels in use here, as JSON.
 """
 
 from __future__ import annotations
@@ -21,12 +20,11 @@ BLAS = ("Haswell", "Zen", "SkylakeX", "Nehalem")
 """Names that OPENBLAS_CORETYPE knows. One that it does not know is passed over in silence; one whose instructions the
 processor lacks is taken all the same, and the first of them ends the process."""
 EXPECTED = "APO_BENCH_KERNELS"
-AT_ONCE = 2
-"""Kernels whose commands run together."""
+AT_ONCE = 2  # kernels whose commands run together
 PROCESSES = "{processes}"
 """Stands in a command of pytest for how many processes it starts: none of its own where several kernels run together,
 so that what a process imports is paid once per kernel."""
-TOLD = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+OUTPUT = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def under(environment: Mapping[str, str]) -> Kernels | str:
 def switches(own: Kernels) -> Iterator[Switch | str]:
     """Every switch that took, or a sentence on one that is not run, given the kernels without any.
 
-    The first is the one under which Numba compiles anew, which takes longest.
+    The first is the one under which Numba compiles again, which takes longest.
     """
     plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(own.numpy), "NUMBA_CPU_NAME": "generic"}
     found = under(plain)
@@ -126,16 +124,20 @@ def taken(own: Kernels) -> Iterator[Switch]:
 
 
 def run(switch: Switch, command: list[str], **options: object) -> subprocess.CompletedProcess[str]:
-    """The command under the switch, told what it has to find."""
-    told = {**os.environ, **switch.environment, EXPECTED: json.dumps(asdict(switch.kernels))}
-    return subprocess.run(command, env=told, text=True, check=False, **options)  # type: ignore[call-overload]
+    """Run the command under the switch, with the kernels that it has to find."""
+    environment = {**os.environ, **switch.environment, EXPECTED: json.dumps(asdict(switch.kernels))}
+    return subprocess.run(command, env=environment, text=True, check=False, **options)  # type: ignore[call-overload]
 
 
 def missing() -> str | None:
     """What is wrong where the kernels of this process are not those that it was started for."""
-    told = os.environ.get(EXPECTED)
-    found = json.loads(json.dumps(asdict(in_use()))) if told is not None else None
-    return None if told is None or found == json.loads(told) else f"the kernels here are {found}, not {told}"
+    environment = os.environ.get(EXPECTED)
+    found = json.loads(json.dumps(asdict(in_use()))) if environment is not None else None
+    return (
+        None
+        if environment is None or found == json.loads(environment)
+        else f"the kernels here are {found}, not {environment}"
+    )
 
 
 def main(command: list[str]) -> int:
@@ -150,7 +152,7 @@ def main(command: list[str]) -> int:
     processes = "0" if len(to_run) > 1 else str(AT_ONCE)
     command = [processes if word == PROCESSES else word for word in command]
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        runs = [(switch, pool.submit(run, switch, command, **TOLD)) for switch in to_run]
+        runs = [(switch, pool.submit(run, switch, command, **OUTPUT)) for switch in to_run]
         for switch, ended in runs:
             print(f"-- under {switch.name}\n{ended.result().stdout}", end="", flush=True)
     return int(any(ended.result().returncode for _, ended in runs))

@@ -48,9 +48,9 @@ def first_sentence(command: Any) -> str:
 def section(name: str, command: Any) -> list[str]:
     """One command: what it does, and a table of what it takes."""
     words = [p.name.upper() if p.required else f"[{p.name.upper()}]" for p in command.params if not is_option(p)]
-    told = [" ".join(part.split()) for part in (command.help or "").split("\n\n")]
+    paragraphs = [" ".join(part.split()) for part in (command.help or "").split("\n\n")]
     lines = ["", f"## {name} {{#{name.replace(' ', '-')}}}", "", f"`{' '.join([name, *words, '[OPTIONS]'])}`", ""]
-    lines += ["\n\n".join(told), "", "| argument or option | meaning | default |", "|---|---|---|"]
+    lines += ["\n\n".join(paragraphs), "", "| argument or option | meaning | default |", "|---|---|---|"]
     return lines + [row(p) for p in command.params if p.name != "help"]
 
 

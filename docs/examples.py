@@ -21,7 +21,7 @@ from apo_bench.assembly import Plan, ReplayResult
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
+from apo_bench.simulation.scene.render import SceneCamera, aim_camera, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
@@ -157,7 +157,7 @@ def _camera(goals: Array) -> SceneCamera:
     high = goals[:, :3, 3].max(axis=0)
     turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))
     far = 0.42 + 0.7 * float(np.linalg.norm(high - low))
-    return camera_view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
+    return aim_camera(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
 
 
 if __name__ == "__main__":

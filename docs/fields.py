@@ -63,7 +63,7 @@ FEW = 4
 
 def settings_page() -> str:
     """The page of settings, as Markdown."""
-    said = sentences(TrialConfig)
+    meanings = sentences(TrialConfig)
     lines = [
         SETTINGS_HEAD,
         "| setting | meaning | value | default | option | values in a sweep |",
@@ -73,18 +73,18 @@ def settings_page() -> str:
         option = f"`--{info.option}`" if info.help else "argument"
         default = "" if info.default is MISSING else info.usual or f"`{info.default}`"
         axis = "several" if info.axis or (info.drawn and info.help) else "one" if info.shared else ""
-        lines.append(f"| `{name}` | {said[name]} | {value_of(info)} | {default} | {option} | {axis} |")
+        lines.append(f"| `{name}` | {meanings[name]} | {value_of(info)} | {default} | {option} | {axis} |")
     return "\n".join(lines) + "\n"
 
 
 def record_page() -> str:
     """The page of columns, as Markdown."""
-    said = sentences(TrialConfig) | sentences(TrialRecord) | FIRST
+    meanings = sentences(TrialConfig) | sentences(TrialRecord) | FIRST
     lines = [RECORD_HEAD, "| column | meaning | value | null | |", "|---|---|---|---|---|"]
     for column, kind in RECORD_FIELDS.items():
         value, null = without_null(type_info(kind))
         need = "key" if column in KEY else "needed" if column in REQUIRED else ""
-        lines.append(f"| `{column}` | {said[column]} | {words(value)} | {'yes' if null else ''} | {need} |")
+        lines.append(f"| `{column}` | {meanings[column]} | {words(value)} | {'yes' if null else ''} | {need} |")
     lines += ["", "## How a trial can end", "", f"Stages, in their order: {', '.join(f'`{s}`' for s in STAGES)}.", ""]
     lines += ["| code | sentence |", "|---|---|"]
     return "\n".join([*lines, *(f"| `{code}` | {sentence} |" for code, sentence in CODES.items())]) + "\n"

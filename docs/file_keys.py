@@ -1,7 +1,7 @@
-"""The page of every key in scenario, part, noise, arm and sweep files, read from the program itself.
+"""The page of all keys in scenario, part, noise, arm and sweep files, read from the types of the package.
 
-The tables of a file are types whose fields are their keys. What a key means stands here; a key without a meaning, or a
-meaning without a key, is an error. Arms are a dataclass.
+The fields of a type are the keys of a table. This file has their meanings; a key without a meaning, or a meaning
+without a key, is an error.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from apo_bench.simulation.arms.arm import Arm
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "docs" / "guide" / "sweeps.md"
-POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; else `[0, 0, 0]`"}
+POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; default `[0, 0, 0]`"}
 FIT = "`true`: it recedes by the clearance"
 AXIS = {
     "at_mm": "a point of its axis",
@@ -37,7 +37,7 @@ AXIS = {
 }
 AROUND = {
     "fit": FIT,
-    "extent_deg": "how far it reaches around the axis; else 360",
+    "extent_deg": "how far it reaches around the axis; default 360",
     "toward": "from the axis to the middle of the face, of one that does not reach all around",
 }
 SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
@@ -68,16 +68,16 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     "Scenario files": {
         "": {
             "schema": "1",
-            "title": "what the task is, in a few words",
-            "paper": "where it stands in the paper",
-            "human": "what the simulated person does, for people who read the task card",
-            "success": "what is right at the end, for people who read the task card",
-            "clearance_mm": "room per side of parts that fit, 0 to 5; else 0.25",
-            "gap_mm": "below this gap a contact equation counts as solved, up to 5; else 0.1",
+            "title": "the task in a few words",
+            "paper": "its place in the paper",
+            "human": "what the simulated human does, for the task sheet",
+            "success": "the right end, for the task sheet",
+            "clearance_mm": "clearance per side of parts that fit, 0 to 5; default 0.25",
+            "gap_mm": "below this gap a contact equation counts as solved, up to 5; default 0.1",
             "parts": "one table per part: `[parts.NAME]`",
             "operations": "one table per operation, in order: `[[operations]]`",
-            "site": "where the assembly stands; else at the origin of the table",
-            "human_error": "the error of the person; else there is none",
+            "site": "where the assembly stands; default at the origin of the table",
+            "human_error": "the error of the human; default none",
             "judge": "thresholds of the verdict",
         },
         "parts.NAME": {
@@ -95,14 +95,14 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "carries": "parts that go with it",
             "goal": "pose of the moved part in the frame of the assembly when the operation is over",
             "contacts": "pairs `[face of what moves, part.face of what rests]`, or tables",
-            "attach": "a preference for the way to the goal; else it is found",
-            "grasp": "where the gripper takes the part; else above the middle of boxes, or as its shape offers",
+            "attach": "a preference for the way to the goal; default it is found",
+            "grasp": "where the gripper takes the part; default above the middle of boxes, or as its shape offers",
             "vary": "a shift or a turn that each trial draws, or a list of them (20 in a scenario at most)",
         },
         "operations, contacts": {
             "faces": "the pair of faces",
             "kind": "`centred` (else), `contact` or `clearance`",
-            "gap_mm": "of `clearance`: lowest and highest distance; else the play",
+            "gap_mm": "of `clearance`: lowest and highest distance; default the play",
         },
         "operations, attach": {
             "along": f"direction of the last motion, {SHIFT}",
@@ -119,7 +119,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "mm": "lowest and highest shift",
             "about": f"of a turn, with `deg`: its axis, {SHIFT}",
             "deg": "lowest and highest turn",
-            "at_mm": "a point of that axis, frame of the part; else its origin",
+            "at_mm": "a point of that axis, frame of the part; default its origin",
         },
         "site": {
             "center_mm": "middle of the places, x and y in the world",
@@ -145,7 +145,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "outlier_farthest_mm": "outliers are off by `limit_mm` to this",
             "shift": "errors of the position",
             "turn": "errors of the turn",
-            "camera": "pose of the camera in the world, `{ at_mm, turn_deg }`; else the default one",
+            "camera": "pose of the camera in the world, `{ at_mm, turn_deg }`; default the default one",
         },
         "shift": {
             "limit_mm": "no error of an inlier is longer",
@@ -162,14 +162,14 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "along_degrees_of_freedom": "its degrees of freedom",
         },
     },
-    "Files beside parts": {
+    "TOML files of parts": {
         "": {
             "schema": "`apo-bench/part/1`",
-            "title": "what a person calls the part, in any letters",
-            "source": "where the shape comes from",
-            "licence": "what may be done with it",
-            "density": "in kg/m^3, 1 to 25000; else 1000",
-            "friction": "sliding, or sliding, turning and rolling, as in MJCF; else MJCF's own",
+            "title": "name of the part for people",
+            "source": "source of the shape",
+            "licence": "its licence",
+            "density": "in kg/m^3, 1 to 25000; default 1000",
+            "friction": "sliding, or sliding, turning and rolling, as in MJCF; default MJCF's own",
             "volume_mm3": "of the exact solid",
             "centroid_mm": "of the exact solid",
             "inertia_mm5": "xx, yy, zz, xy, xz, yz of the exact solid of density 1 about its centroid",
@@ -200,18 +200,18 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
         "": {
             "scenario": "name or scenario file: one or several",
             **sweep_meanings(),
-            "trials": "seeds per cell, 1 to 1000000; else 100",
-            "seed": "the first seed; else 0",
-            "also": "further grids, one table each: `[[also]]`. What a grid does not state is as above",
+            "trials": "seeds per condition, 1 to 1000000; default 100",
+            "seed": "the first seed; default 0",
+            "also": "further grids, one table each: `[[also]]`; keys that a grid lacks are those above",
         },
     },
 }
 """File -> table -> key -> what it means."""
 HEAD = """# File keys
 
-Every key of every file that you may write. In TOML files lengths are in mm and angles in degrees; in part files, as
-always in MJCF, lengths are in metres. In TOML files a key that is not listed is refused, with the nearest one that is.
-*Needed*: the file is refused without it.
+All keys of the files that you can write. In TOML files lengths are in mm and angles in degrees; in part files, as
+always in MJCF, lengths are in metres. The reader rejects a key that is not listed, with the nearest one. *Needed*: the
+reader rejects a file without it.
 """
 Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
 """Table -> keys that are needed, keys that are allowed."""
@@ -222,15 +222,15 @@ def page() -> str:
     found = {
         "Scenario files": scenario_keys(),
         "Noise files": noise_keys(),
-        "Files beside parts": face_keys(),
+        "TOML files of parts": face_keys(),
         "Sweep files": sweep_keys(),
     }
     lines = [HEAD]
     for file, tables in MEANINGS.items():
-        said = {t: set(keys) for t, keys in tables.items()}
+        explained = {t: set(keys) for t, keys in tables.items()}
         known = {t: set(k[1]) for t, k in found[file].items()}
-        if said != known:
-            raise ValueError(f"docs/file_keys.py, {file}: {said} is explained, {known} is read.")
+        if explained != known:
+            raise ValueError(f"docs/file_keys.py explains {explained} of {file}, but the package reads {known}.")
         lines += ["", f"## {file}"]
         for table, keys in tables.items():
             needed = found[file][table][0]
@@ -319,8 +319,8 @@ def arm_lines() -> list[str]:
     lines[-1] += " `apo_bench.Arm` or a function that returns one. The site `tip` lies between the"
     lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
     lines += ["", "| field | meaning |", "|---|---|"]
-    said = OBVIOUS | sentences(Arm)
-    lines += [f"| `{field.name}` | {said[field.name]} |" for field in dataclasses.fields(Arm)]
+    explained = OBVIOUS | sentences(Arm)
+    lines += [f"| `{field.name}` | {explained[field.name]} |" for field in dataclasses.fields(Arm)]
     return lines
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene.render import aim_camera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import simulate_demonstration
 
@@ -47,7 +47,7 @@ def finished(name: str) -> NDArray[np.uint8]:
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     extent = float(np.linalg.norm(at.max(axis=0) - at.min(axis=0)))
     azimuth = AZIMUTH_DEG.get(name, 128.0)
-    return picture(scene, poses, *SIZE, camera_view(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
+    return draw_picture(scene, poses, *SIZE, aim_camera(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
 
 
 if __name__ == "__main__":

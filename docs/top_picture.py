@@ -24,7 +24,7 @@ from shapely.ops import unary_union
 
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.render import camera_view, picture_with_arm
+from apo_bench.simulation.scene.render import aim_camera, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import replay_and_judge
 
@@ -164,7 +164,7 @@ def photo(scene: Scene, state: Array, view: View, hidden: tuple[str, ...] = ()) 
     model.vis.global_.fovy = view.fovy_deg
     model.vis.headlight.ambient[:] = 0.45 if hidden else 0.25
     model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
-    camera = camera_view(view.at, view.distance_m, view.azimuth_deg, view.elevation_deg)
+    camera = aim_camera(view.at, view.distance_m, view.azimuth_deg, view.elevation_deg)
     image = picture_with_arm(scene, scene.scenario.start, state, *view.size, camera)
     model.geom_rgba[:], model.vis.global_.fovy, model.vis.headlight.ambient[:] = kept
     return image

@@ -12,14 +12,14 @@ from apo_bench.assembly.correction_record import (
     Try,
 )
 from apo_bench.assembly.demonstration import Demonstration, Layout
-from apo_bench.assembly.equations import Equations, largest, largest_gap
+from apo_bench.assembly.equations import Equations, contact_equations, largest, largest_gap
 from apo_bench.assembly.facing import face_gap, faces_oppose, height
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.outlier_model import OutlierModel, measured_rates
-from apo_bench.assembly.pattern import Pattern, faces_away
+from apo_bench.assembly.pattern import Pattern, contact_pattern, faces_away
 from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, poses_in_force, schedule_fault
 from apo_bench.assembly.poses import Poses, placements
 from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
@@ -88,7 +88,9 @@ __all__ = (
     "Try",
     "apart_limit_mm",
     "arc_residuals",
+    "contact_equations",
     "contact_kind",
+    "contact_pattern",
     "corners",
     "deep_limit_mm",
     "face_gap",

@@ -20,7 +20,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.pattern import cross_rows, pattern
+from apo_bench.assembly.pattern import contact_pattern, cross_rows
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, product
 from apo_bench.geometry import Array, pose
@@ -126,7 +126,7 @@ class Equations:
         return list(accumulate(letters, lambda n, T: np.einsum("mi,mij->mj", n, T), initial=self.plane))
 
 
-def equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
+def contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
     """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
 
     Contacts of round faces are those of sheets (`project_round_faces`).
@@ -138,7 +138,7 @@ def equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
     Args:
         poses: (n, 4, 4), where the vertices are taken, world frame, [m].
     """
-    known = pattern(assembly)
+    known = contact_pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
     stack = np.concatenate([constants, poses])
     vertex = np.array(known.corners)
@@ -155,7 +155,7 @@ def equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
 
 def largest_gap(assembly: Assembly, start: Poses, poses: Array) -> float:
     """The largest |e| of all contacts at `poses`, [m]; 0 if there are none."""
-    return largest(equations(assembly, start, poses).residual(poses))
+    return largest(contact_equations(assembly, start, poses).residual(poses))
 
 
 def largest(e: Array) -> float:

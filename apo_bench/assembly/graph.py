@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly.equations import equations, largest
+from apo_bench.assembly.equations import contact_equations, largest
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.projection import project_round_faces
@@ -120,7 +120,7 @@ def arc_residuals(assembly: Assembly, start: Poses, poses: Array, graph: Graph) 
     """The largest |e| of every arc, [m], at `poses` (n, 4, 4), world frame, [m] (Section 3.3)."""
     done = project_round_faces(assembly.first(graph.step))
     reached = poses[: graph.step]
-    gaps = equations(done, start, reached).gaps(reached)
+    gaps = contact_equations(done, start, reached).gaps(reached)
     named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]
     mine = [[made == arc.made and contact in arc.contacts for made, contact in named] for arc in graph.arcs]
     return tuple(largest(gaps[chosen]) for chosen in mine)

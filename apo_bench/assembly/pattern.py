@@ -51,10 +51,10 @@ class Pattern:
 
 
 @remembered
-def pattern(assembly: Assembly) -> Pattern:
+def contact_pattern(assembly: Assembly) -> Pattern:
     """What the equations of an assembly have in common; its contacts are those of `project_round_faces(assembly)`."""
     if (low := project_round_faces(assembly)) is not assembly:
-        return pattern(low)
+        return contact_pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
     c = len(chosen)
@@ -101,7 +101,7 @@ def faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[np.boo
     Args:
         poses: (*, n, 4, 4), world frame, [m].
     """
-    known = pattern(assembly)
+    known = contact_pattern(assembly)
     constant = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)[:, :3, :3]
     lead = poses.shape[:-3]
     R = np.concatenate(

@@ -38,7 +38,8 @@ class RateTable:
     def __str__(self) -> str:
         """The table as text with aligned columns."""
         table = self._table()
-        return "\n".join(_align([[column.head for column in table.shown], *table.lines]))
+        words = [column.words for column in table.shown]
+        return "\n".join(_align([[column.head for column in table.shown], *table.lines], words))
 
     def to_pandas(self) -> Any:
         """The rows as a `pandas.DataFrame`.
@@ -100,8 +101,9 @@ class RateTable:
         return condition_table(tally(self.records))
 
 
-def _align(lines: Sequence[Sequence[str]]) -> Iterable[str]:
-    """Lines of cells as text, in columns."""
+def _align(lines: Sequence[Sequence[str]], words: Sequence[bool]) -> Iterable[str]:
+    """Lines of cells as text, in columns: words to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     for line in lines:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        cells = zip(line, widths, words, strict=True)
+        yield "  ".join(cell.ljust(width) if left else cell.rjust(width) for cell, width, left in cells).rstrip()

@@ -22,7 +22,7 @@ def doctor_command() -> None:
       apo-bench doctor
       MUJOCO_GL=egl apo-bench doctor
     """
-    from apo_bench import build_scene, load_scenario, picture
+    from apo_bench import build_scene, draw_picture, load_scenario
     from apo_bench.simulation.film.window import no_window
 
     lines = [("apo_bench", f"{__version__}, Python {platform.python_version()}, {platform.platform()}")]
@@ -33,7 +33,7 @@ def doctor_command() -> None:
         lines.append((f"extra {extra}" if extra else "packages", ", ".join(found + [advice] * bool(extra and missing))))
     drawing = "works"
     try:
-        picture(build_scene(load_scenario("block_on_block")), {}, 16, 12)
+        draw_picture(build_scene(load_scenario("block_on_block")), {}, 16, 12)
     except InputError as error:
         drawing = str(error)
     print_columns([*lines, ("rendering", drawing), ("window", no_window() or "works")])

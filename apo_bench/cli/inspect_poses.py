@@ -39,7 +39,7 @@ def poses_command(
       apo-bench inspect poses stick_in_tower --noise-level 2 --seed 7 --out poses.png
       apo-bench inspect poses stick_in_tower --observation docs/seen.csv --step 2 --observed
     """
-    from apo_bench import correct, fitting_plan, load_scenario
+    from apo_bench import correct, fit_plan, load_scenario
     from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.trial.plan_warnings import plan_warning
     from apo_bench.trial.request import load_or_draw_observation
@@ -57,7 +57,7 @@ def poses_command(
         correction = correct(seen, with_simulated(method))
         if not correction.ok:
             raise RuntimeError(f"{method} found no correction: {correction.sentence}; --observed needs none")
-        plan = fitting_plan(correction, seen, task)
+        plan = fit_plan(correction, seen, task)
         notes = "; ".join(filter(None, (plan.sentence, plan_warning(task, plan.plan, correction))))
         panels.append(poses_panel(f"corrected by {method}", seen, plan.plan.target_poses, step, notes))
     draw_poses(task, step, panels, out)

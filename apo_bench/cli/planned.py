@@ -15,9 +15,9 @@ def plan_correction(scenario: Scenario, observation: Observation, correction: Co
     plan = correction.plan(observation)
     moved = ""
     if predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach).fails:
-        from apo_bench import fitting_plan
+        from apo_bench import fit_plan
 
-        fitting = fitting_plan(correction, observation, scenario)
+        fitting = fit_plan(correction, observation, scenario)
         plan = fitting.plan
         moved = fitting.sentence
     return plan, moved, predict_success(plan, observation, correction, scenario)

@@ -6,26 +6,25 @@ writes its contact equations out, `solvers.newton` its solver.
 
 What one correction by `contact` calls, in the folder `contact` unless another is named:
 
-    correctors.correct                      the door for all correctors: checks, and lowers round faces to planes
+    correctors.correct                      the public call: checks, and projects round faces to planes
       contact.ContactCorrector.together     many at once; alone what is large, or states tails or shared errors
         contact._corrected
-          problem.problem_of                contacts become equations (solvers.laid_contacts), noise becomes L
+          problem.problem_of                contacts become equations (solvers.projected_contacts), noise becomes L
           solved.solve                      the nearest poses with rank, covariance and test
             solvers.gauss_newton._nearest   the loop; each iteration linearises the equations, then takes the shortest z
                                             on them (solvers.linear_step, solvers.sparse, or solvers.kernels compiled)
-            chi_square.chi_squares          the squared length of the correction
+            squared_length.chi_squares      the squared length of the correction
             solved._solved                  gaps, rank and covariance (solvers.posterior)
             solved._solved_in_full          instead, where contacts contradict each other, or with inequalities, play or
-                                            tails; chi_square.relaxed_chi_square in it runs the loop again
+                                            tails; squared_length.relaxed_chi_square runs the loop again
           contact._report                   the Correction, if it is in no doubt; otherwise
           contact._in_doubt                 not converged, the test fails, a pose turned far, faces look the same way
             starts.best_start               other starts, each solved as above; none where only the test has failed
             suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
             contact._report                 the Correction
-            checks.status.opposing          `inconsistent` where faces look the same way
+            checks.status.check_facing      `inconsistent` where faces look the same way
 
-`solvers` know equations, `checks` what all corrections are asked. `baselines` are what `contact` is compared with
-(`paper` is the method as it was published), `robust` is the corrector that doubts observations, `touches` learns what
-is wrong with the robot from what it touches. The files beside these folders stand above them: who asks for a
-correction, and what is stated of one.
+`solvers` know equations, `checks` refuse, end and test a correction. `baselines` are what `contact` is compared with
+(`paper` is the method as it was published), `robust` is the corrector that doubts observations, `calibration` estimates
+the errors of the robot from contact probing. The files outside these folders are the public calls.
 """

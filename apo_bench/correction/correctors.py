@@ -10,7 +10,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Reobserver, ReobservingCorrector, project_observation
 from apo_bench.correction.checks.as_given import gap_of, poses_as_given
 from apo_bench.correction.checks.correction_checks import check_correction, check_observation, check_poses
-from apo_bench.correction.checks.status import opposing
+from apo_bench.correction.checks.status import check_facing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, kind, require
 from apo_bench.geometry import Array, real
@@ -39,7 +39,7 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
         CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observation(observation)
-    chosen = checked_corrector(corrector)
+    chosen = resolve_corrector(corrector)
     name = _name_of(corrector, chosen)
     ours = _is_ours(chosen)
     # The equations know planes alone, so correctors of the package get round faces projected to planes; `contact`
@@ -62,7 +62,7 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reo
     return replace(correction, assumed=replace(correction.assumed, assembly=observation.assembly))
 
 
-def checked_corrector(corrector: Any) -> Any:
+def resolve_corrector(corrector: Any) -> Any:
     """The corrector that is named, or was given.
 
     Raises:
@@ -85,7 +85,7 @@ def _admit(returned: Any, observation: Observation, chosen: Any, name: str) -> C
     """Take what a corrector returned as a `Correction` that makes sense."""
     if isinstance(returned, Correction) and _is_ours(chosen):
         # `ContactCorrector` has asked already which faces look the same way (`Solved.away`, `_in_doubt`).
-        return returned if isinstance(chosen, ContactCorrector) else opposing(observation, returned)
+        return returned if isinstance(chosen, ContactCorrector) else check_facing(observation, returned)
     if not isinstance(returned, Correction):
         poses = _checked_poses(returned, len(observation.poses), name)
         return poses_as_given(observation, poses, "the corrector returned poses and no status")

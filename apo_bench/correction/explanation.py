@@ -24,10 +24,10 @@ from apo_bench.assembly import (
     Observation,
     Operation,
     Poses,
+    contact_pattern,
     placements,
     project_observation,
 )
-from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
@@ -103,7 +103,7 @@ class Explanation:
 
     assembly: Assembly
     poses: Array
-    """(n, 4, 4), at which it was problem."""
+    """(n, 4, 4), where the contacts were linearised."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
     """The parts that were moved, in the order in which they were placed."""
@@ -198,7 +198,7 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
 
 def _void(assembly: Assembly, kept: NDArray[np.bool_]) -> int:
     """How many compact equations say nothing: of contacts that are not kept, and of fewer than three points."""
-    said = np.where(kept, np.minimum(np.diff(pattern(assembly).begin), 3), 0)
+    said = np.where(kept, np.minimum(np.diff(contact_pattern(assembly).begin), 3), 0)
     return int((3 - said).sum())
 
 

@@ -42,7 +42,7 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene import build_scene, data_with_arm
-from apo_bench.trial.fitting import fitting_plan
+from apo_bench.trial.fitting import fit_plan
 from apo_bench.trial.predicted_success import abstain, predict_success
 from apo_bench.trial.stages import (
     demonstration_failure,
@@ -292,7 +292,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         Raises:
             InputError: The correction did not converge.
         """
-        return fitting_plan(correction, self.observation, self._scene).plan
+        return fit_plan(correction, self.observation, self._scene).plan
 
     def refuse(self, code: str, why: str) -> None:
         """Let the next step fail at stage `correct`, without a replay; for wrappers."""

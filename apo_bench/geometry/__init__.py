@@ -1,7 +1,7 @@
 """Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
 
 from apo_bench.geometry.arrays import Array, Ints, copyable, freeze, frozen, real, remembered
-from apo_bench.geometry.clearance import physical_pieces, receded_pieces
+from apo_bench.geometry.clearance import physical_pieces, recede_pieces
 from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
 from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
 from apo_bench.geometry.exact_turns import depth_inside
@@ -104,7 +104,7 @@ __all__ = (
     "polygons_of",
     "quarter_turns",
     "real",
-    "receded_pieces",
+    "recede_pieces",
     "remembered",
     "revolution",
     "right_jacobian",

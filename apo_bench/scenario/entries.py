@@ -1,4 +1,4 @@
-"""The tables [parts] and [[operations]] of a scenario file become parts and operations."""
+"""Parts and operations out of the tables of a scenario file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from apo_bench.assembly import Operation
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io import convert_typed
-from apo_bench.planning.insertion.arrival import Preference
+from apo_bench.planning.insertion.attach import Preference
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.parts import load_part, part_path

@@ -1,4 +1,4 @@
-"""Load a scenario: a TOML file becomes a checked `Scenario`.
+"""Load scenarios by name or from a TOML file.
 
 Lengths in mm, angles in degrees, operations numbered from 1; the file of the scenario `stick_in_tower` shows every key.
 """
@@ -14,7 +14,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
 from apo_bench.io import UNSHOWN, convert_typed, read_typed
-from apo_bench.planning.insertion.arrival import Preference
+from apo_bench.planning.insertion.attach import Preference
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.attach_lines import with_attach_lines

@@ -1,4 +1,4 @@
-"""A scenario: one demonstration as a recipe. Files are read by `apo_bench.scenario.file`."""
+"""A scenario: one demonstration as a recipe."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, copyable, freeze, pose
-from apo_bench.planning.insertion.arrival import Attach
+from apo_bench.planning.insertion.attach import Attach
 from apo_bench.records import Meaning, Thresholds
 
 

@@ -11,8 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Correction, Observation, Plan, poses_in_force
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Observation, Plan, contact_equations, poses_in_force
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.failure import predict
@@ -70,7 +69,7 @@ class FittingPlan:
 
 
 @check_arguments
-def fitting_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
+def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
     """What the robot is to do after a correction, with free directions chosen so that it fits.
 
     Args:
@@ -150,7 +149,7 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact each time before work is taken apart, [m]."""
     return [
-        equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
         for upto, goals in poses_in_force(plan)[:-1]
     ]
 

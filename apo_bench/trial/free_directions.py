@@ -14,8 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Equations, Observation
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Equations, Observation, contact_equations
 from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.correction.solvers import (
     CompactEquations,
@@ -207,7 +206,7 @@ def shortest_above(G: Array, h: Array) -> Array | None:
 def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
     assembly = observation.assembly
-    plain = equations(assembly, observation.start, goals)
+    plain = contact_equations(assembly, observation.start, goals)
     system, exact, inequalities = demanded(plain, assembly, observation.play_m)
     off = violations(system, exact, inequalities, goals)
     if (off > observation.gap_m).any():

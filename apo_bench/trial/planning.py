@@ -10,7 +10,7 @@ from apo_bench.geometry import Array
 from apo_bench.records import with_simulated
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fitting import FittingPlan, fitting_plan
+from apo_bench.trial.fitting import FittingPlan, fit_plan
 from apo_bench.trial.nominal import fit_nominal_poses
 from apo_bench.trial.stages import observation_failure
 
@@ -62,7 +62,7 @@ def apply_method(
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
     plan = correction.plan(observation)
-    fitting = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where)
+    fitting = FittingPlan(plan) if where is None else fit_plan(correction, observation, where)
     after_m = correction.gap_after_m
     if fitting.moves:
         after_m = largest_gap(plan.assembly, plan.start, fitting.plan.target_poses)

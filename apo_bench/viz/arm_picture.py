@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.io import write_file
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.scene import build_scene, camera_view
+from apo_bench.simulation.scene import aim_camera, build_scene
 from apo_bench.simulation.scene.render import picture_with_arm
 
 _SIZE = (960, 720)
@@ -22,6 +22,6 @@ def draw_arm(arm: Arm, scenario: Scenario, out: Path) -> None:
     import imageio.v3 as imageio
 
     scene = build_scene(scenario, arm=arm, grasp="weld")
-    camera = camera_view(_MIDDLE_M, _DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG)
+    camera = aim_camera(_MIDDLE_M, _DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG)
     image = picture_with_arm(scene, scenario.start, None, *_SIZE, camera)
     write_file(out, imageio.imwrite("<bytes>", image, extension=".png"))

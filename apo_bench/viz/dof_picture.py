@@ -12,7 +12,7 @@ from apo_bench.geometry import Array, Solid, extent
 from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, build_scene, camera_view, picture, pixels
+from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, aim_camera, build_scene, draw_picture, pixels
 from apo_bench.viz.dof_text import format_deviation
 from apo_bench.viz.panels import Color, Panel, PanelLine, draw_panels
 
@@ -37,7 +37,7 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
     poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
     first = explanation.poses[0]
     azimuth = float(np.degrees(np.arctan2(first[1, 0], first[0, 0]))) + _AZIMUTH_DEG
-    camera = camera_view(*frame_parts(scenario.assembly, [poses], own), azimuth, _ELEVATION_DEG)
+    camera = aim_camera(*frame_parts(scenario.assembly, [poses], own), azimuth, _ELEVATION_DEG)
     # the horizontal direction towards the camera
     toward = -np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.0])
     marks = []
@@ -49,7 +49,7 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
             marks += [_mark(solid, part.pose, color, free.direction, toward) for free in own[part.part].free]
             lines.append(PanelLine(_describe(explanation, own[part.part]), color))
     scene = build_scene(scenario)
-    image = picture(scene, poses, *_SIZE, camera, Marks(marks))
+    image = draw_picture(scene, poses, *_SIZE, camera, Marks(marks))
     title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.poses)}"
     figure = draw_panels(title, [Panel(image, lines)])
     for mark in marks:

@@ -68,7 +68,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files, secret_seed: 
     import imageio.v3 as iio
 
     from apo_bench.scenario.file import is_named
-    from apo_bench.simulation.scene.render import picture
+    from apo_bench.simulation.scene.render import draw_picture
     from apo_bench.trial.stages import scene_of
     from apo_bench.viz.trial_again import why_different
 
@@ -76,7 +76,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files, secret_seed: 
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
     config = replace(settings_of(record, files.get(name, name)), secret_seed=secret_seed)
     scene = scene_of(config)
-    picture(scene, {}, 16, 12)  # fails at once where nothing can draw
+    draw_picture(scene, {}, 16, 12)  # fails at once where nothing can draw
     contact = _failed_contact(record, scene)
     reason = why_different(record, config)
     how = "how the replay ended, run again for this picture"
@@ -84,7 +84,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files, secret_seed: 
     if image is None:
         poses = _read_poses(_whole_record(folder, record).get("reached"))
         require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
-        image = picture(scene, poses, *_SIZE, _camera(scene, record, poses), _mark(contact, scene, poses))
+        image = draw_picture(scene, poses, *_SIZE, _camera(scene, record, poses), _mark(contact, scene, poses))
         reason = reason or "now it ends in another way"
         how = f"where the parts ended, as the record says; {reason}, so it does not run again"
     at = "" if contact is None else f"; the arrow points at {contact}"
@@ -149,11 +149,11 @@ def _read_poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
 def _camera(scene: Any, record: TrialRecord, poses: Poses) -> Any:
     """A view of the parts of the operation that failed, else of all that were assembled."""
     from apo_bench.simulation.film.framing import frame_parts
-    from apo_bench.simulation.scene.render import camera_view
+    from apo_bench.simulation.scene.render import aim_camera
 
     assembly = scene.scenario.assembly
     k = record.get("failure_operation")
     failed = assembly.operations if k is None else assembly.operations[k - 1 : k]
     near = {part for o in failed for part in (*o.moves, *(contact.environment.part for contact in o.contacts))}
     shown = (near & poses.keys()) - assembly.fixed or poses.keys() - assembly.fixed
-    return camera_view(*frame_parts(assembly, [poses], shown), _AZIMUTH_DEG, _ELEVATION_DEG)
+    return aim_camera(*frame_parts(assembly, [poses], shown), _AZIMUTH_DEG, _ELEVATION_DEG)

@@ -13,8 +13,9 @@ from apo_bench.assembly import Plan, placements, spell
 from apo_bench.formats.json_forms import pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.io import columns, direction
-from apo_bench.planning.insertion.arrival import Arrival, OperationMacros, turning_state
+from apo_bench.planning.insertion.arrival import Arrival, turning_state
 from apo_bench.planning.insertion.macros import Macro
+from apo_bench.planning.insertion.operation_macros import OperationMacros
 from apo_bench.scenario import Grasp, Scenario, nominal_operations, nominal_start
 
 _SCHEMA = "apo-bench/macros/1"

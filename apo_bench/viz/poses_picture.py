@@ -13,7 +13,7 @@ from apo_bench.io import default_looks, save_figure
 from apo_bench.judging.contacts import face_overlap
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.scene import build_scene, camera_view, picture
+from apo_bench.simulation.scene import aim_camera, build_scene, draw_picture
 from apo_bench.viz.panels import Panel, PanelLine, draw_panels
 
 _SIZE = (620, 480)
@@ -76,8 +76,8 @@ def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out:
     near = {*last.moves, *(contact.environment.part for contact in last.contacts)} - set(assembly.fixed)
     first = panels[0].poses[assembly.operations[0].main]
     azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
-    camera = camera_view(*frame_parts(assembly, [panels[0].poses], near), azimuth, _ELEVATION_DEG)
-    drawn = [Panel(picture(scene, p.poses, *_SIZE, camera), _lines_below(p), p.title) for p in panels]
+    camera = aim_camera(*frame_parts(assembly, [panels[0].poses], near), azimuth, _ELEVATION_DEG)
+    drawn = [Panel(draw_picture(scene, p.poses, *_SIZE, camera), _lines_below(p), p.title) for p in panels]
     save_figure(draw_panels(f"{scenario.name} after operation {step}", drawn), out)
 
 

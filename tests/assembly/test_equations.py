@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly
-from apo_bench.assembly import Contact, Equations, Operation, PartFace, largest_gap, placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Contact, Equations, Operation, PartFace, contact_equations, largest_gap, placements
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import Array, pose
 from apo_bench.geometry.covering import overlap
@@ -60,7 +59,7 @@ def long_words() -> scenes.Scene:
 
 def differences(scene: scenes.Scene, by: float = 1e-6) -> tuple[Array, Array]:
     """The analytic Jacobian and the one of central differences, by body twists of every goal."""
-    system = equations(scene.assembly, scene.start, scene.goals)
+    system = contact_equations(scene.assembly, scene.start, scene.goals)
     _, J = system.linearised(scene.goals)
     numeric = np.zeros_like(J)
     for k in range(len(scene.goals)):
@@ -91,7 +90,7 @@ def test_no_gap_at_the_truth(build) -> None:
 @settings(max_examples=20, deadline=None)
 def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
     scene = random_scene(seed)
-    e = equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
+    e = contact_equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
     history = placements(scene.assembly, scene.start, scene.goals)
     row = 0
     for contact, made, _ in scene.assembly.relations():
@@ -120,15 +119,15 @@ def scenes_area(face) -> float:
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     scene = random_scene(seed)
     moved = scenes.turned(scene, pose.exp(np.random.default_rng(seed).standard_normal(6)))
-    e, J = equations(scene.assembly, scene.start, scene.goals).linearised(scene.goals)
-    e_moved, J_moved = equations(moved.assembly, moved.start, moved.goals).linearised(moved.goals)
+    e, J = contact_equations(scene.assembly, scene.start, scene.goals).linearised(scene.goals)
+    e_moved, J_moved = contact_equations(moved.assembly, moved.start, moved.goals).linearised(moved.goals)
     assert_allclose(e_moved, e, atol=1e-12)
     assert_allclose(J_moved, J, atol=1e-12)
 
 
 def test_gap_is_positive_and_penetration_negative() -> None:
     scene = scenes.stick_on_castles()
-    system = equations(scene.assembly, scene.start, scene.goals)
+    system = contact_equations(scene.assembly, scene.start, scene.goals)
     for height, sign in ((2.0, 1.0), (-2.0, -1.0)):
         moved = scene.goals.copy()
         moved[0] = moved[0] @ scenes.mm(0, 0, height)
@@ -151,7 +150,7 @@ def with_free(system: Equations, free: set[int] | None) -> Equations:
 def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) -> None:
     scene = scenes.ALL[name]()
     columns = range(len(scene.goals)) if free is None else free
-    e, J = with_free(equations(scene.assembly, scene.start, scene.goals), free).linearised(scene.goals)
+    e, J = with_free(contact_equations(scene.assembly, scene.start, scene.goals), free).linearised(scene.goals)
     chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
     scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
     assert [least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]

@@ -12,7 +12,7 @@ from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import Contact, Poses, contact_kind, joint_play_mm, placements
 from apo_bench.geometry import Overlap, intrusion_depths, pose
 from apo_bench.judging.contacts import ContactJudge
-from apo_bench.planning.prediction.resting import physical_solids
+from apo_bench.planning.prediction.interference import physical_solids
 from apo_bench.records import Thresholds
 from tests.end_states import CASTLES, CLEARANCE_MM
 from tests.shipped import TILTED

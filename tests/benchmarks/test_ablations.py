@@ -7,8 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, Observation
-from apo_bench.assembly import Try, placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Try, contact_equations, placements
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import paper_track
 from apo_bench.geometry import Array, pose
@@ -98,7 +97,7 @@ def test_without_history_the_stick_of_example_5_2_keeps_its_observed_pose_in_the
 def test_without_lost_contacts_the_fixture_of_example_5_3_stays_wrong() -> None:
     given = observe("fixture")
     found, whole = no_disappeared(given), paper(given)
-    system = equations(given.assembly, given.start, given.poses)
+    system = contact_equations(given.assembly, given.start, given.poses)
     against = [str(relation.contact) for relation in given.assembly.relations()].index("castle2.py on cube.ny")
     assert (found.status, freed(found), freed(whole)) == ("converged", (5, 3, 1), (5, 3, 2, 1))
     assert_array_equal(found.poses[1], given.poses[1])

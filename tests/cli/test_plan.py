@@ -14,7 +14,7 @@ from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
 from apo_bench.io import direction
-from apo_bench.planning.insertion.arrival import understand
+from apo_bench.planning.insertion.operation_macros import understand
 from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import nominal_start

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Observation, Scenario, explain, load_scenario
-from apo_bench.assembly import placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import contact_equations, placements
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.directions import directions
 from apo_bench.correction.explanation import Explanation
@@ -38,7 +37,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
     """What is left of the contacts when goal k has moved and some later ones adapt."""
     goals = np.array(seen.poses)
     goals[k] = goals[k] @ pose.exp(STEP * twist)
-    system = equations(seen.assembly, seen.start, seen.poses)
+    system = contact_equations(seen.assembly, seen.start, seen.poses)
     free = tuple(adapting)
     if not free:
         return float(np.abs(system.residual(goals)).max())

@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from apo_bench import InputError, correct, correct_many, explain
-from apo_bench.assembly import Gap, largest_gap, project_round_faces
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Gap, contact_equations, largest_gap, project_round_faces
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance
@@ -38,14 +37,14 @@ def test_each_kind_fixes_what_a_table_says(kind):
     assert largest_gap(observation.assembly, observation.start, truth) < 1e-12
     found = explain(observation, truth).operations[1]
     assert (found.rank, found.fixed) == (CONTACTS[kind][2], BY_HAND[kind])
-    _, J = equations(observation.assembly, observation.start, truth).linearised(truth)
+    _, J = contact_equations(observation.assembly, observation.start, truth).linearised(truth)
     assert np.linalg.matrix_rank(J[:, 6:] / np.repeat([1.0, 0.04], 3), tol=1e-6) == CONTACTS[kind][2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_jacobian_is_that_of_finite_differences(kind):
     observation, _ = case(kind)
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     _, J = system.linearised(observation.poses)
     step = 1e-6
     for column in range(12):

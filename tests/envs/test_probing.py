@@ -71,5 +71,5 @@ def test_whether_it_feels_is_true_or_false() -> None:
 
 
 def test_pads_that_do_not_close_square_nothing() -> None:
-    with pytest.raises(InputError, match="the grasp 'weld' was given for a method with .probe"):
+    with pytest.raises(InputError, match=r"the grasp 'weld' was given for a method with .probe"):
         APOReplay(SCENARIO, probe=True, grasp="weld")

@@ -31,10 +31,10 @@ scene = build_scene(load_scenario("block_on_block"))
 """
 DRAW = """
 from apo_bench.errors import InputError
-from apo_bench.simulation.scene.render import picture
+from apo_bench.simulation.scene.render import draw_picture
 for _ in range(2):
     try:
-        print(picture(scene, {}, 64, 48).shape)
+        print(draw_picture(scene, {}, 64, 48).shape)
     except InputError as error:
         print(error)
 """

@@ -18,12 +18,11 @@ from apo_bench import (
     TrialConfig,
     build_scene,
     correct,
-    fitting_plan,
+    fit_plan,
     load_scenario,
     run_trial,
 )
-from apo_bench.assembly import Step
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Step, contact_equations
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -56,7 +55,7 @@ def foretold(plan: Plan, scene: Scene) -> Prediction:
 @cache
 def planned(name: str, seed: int, corrector: Any = plain) -> tuple[Correction, FittingPlan]:
     correction = correct(seen_at(name, seed), corrector)
-    return correction, fitting_plan(correction, seen_at(name, seed), scene_named(name))
+    return correction, fit_plan(correction, seen_at(name, seed), scene_named(name))
 
 
 @pytest.mark.parametrize(
@@ -85,7 +84,7 @@ def test_contacts_hold_as_they_did(seed: int) -> None:
     seen = seen_at("carried_bridge", seed)
     correction, found = planned("carried_bridge", seed)
     before, after = (
-        equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
+        contact_equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
     )
     assert before.max() < 1e-9
     assert after.max() < 1e-9
@@ -108,7 +107,7 @@ def test_contacts_that_are_off_are_left_alone() -> None:
     torn[3] = torn[3] @ pose.at((0.0, 0.002, 0.0), (0.0, 0.0, 0.0))
     correction = correct(seen, lambda _: torn)
     assert foretold(correction.plan(seen), scene).code == "residual"
-    np.testing.assert_array_equal(fitting_plan(correction, seen, scene).plan.target_poses, torn)
+    np.testing.assert_array_equal(fit_plan(correction, seen, scene).plan.target_poses, torn)
 
 
 def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
@@ -116,7 +115,7 @@ def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
     scene = scene_named("carried_bridge")
     correction, first = planned("carried_bridge", 96)
     for where in (scene, scene.scenario):
-        again = fitting_plan(correction, seen, where)
+        again = fit_plan(correction, seen, where)
         np.testing.assert_array_equal(again.plan.target_poses, first.plan.target_poses)
         assert again.sentence == first.sentence
 
@@ -164,7 +163,7 @@ def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
     schedule = (*map(Step, range(5)), Step(4, undo=True), Step(4))
     targets = np.array([correction.poses[step.operation] for step in schedule])
     targets[4] = targets[5] = targets[4] @ pose.at((0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
-    found = fitting_plan(replace(correction, schedule=schedule, step_poses=targets), seen, scene).plan
+    found = fit_plan(replace(correction, schedule=schedule, step_poses=targets), seen, scene).plan
     np.testing.assert_array_equal(found.step_poses[[0, 1, 2, 3, 6]], found.target_poses)
     np.testing.assert_array_equal(found.step_poses[4:6], targets[4:6])
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Poses, Reached, Snapshot, placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Poses, Reached, Snapshot, contact_equations, placements
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry import Array, pose
 from apo_bench.trial.pose_error import goal_errors, pose_errors
@@ -72,7 +71,7 @@ def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:
     fixed, free = errors(scene, {2: error})
     goals = scene.goals.copy()
     goals[1] = goals[1] @ error
-    mended = solve_newton(equations(scene.assembly, scene.start, goals), goals, range(3)).poses
+    mended = solve_newton(contact_equations(scene.assembly, scene.start, goals), goals, range(3)).poses
     taken_back = pose.log(pose.inverse(goals) @ mended) * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed == pytest.approx(np.linalg.norm(taken_back) / np.sqrt(3), rel=1e-3)
     assert fixed == pytest.approx(0.0997, abs=1e-4)

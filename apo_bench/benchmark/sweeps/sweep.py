@@ -10,7 +10,7 @@ from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
 from apo_bench.benchmark.sweeps.progress import progress
 from apo_bench.benchmark.sweeps.stopping import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
-from apo_bench.correction.correctors import checked_corrector
+from apo_bench.correction.correctors import resolve_corrector
 from apo_bench.errors import require, require_known
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.wrong_contacts import make_contacts
@@ -178,7 +178,7 @@ def _check_names(grids: Sequence[SweepConfig]) -> None:
         for method in grid.method:
             corrector = parse_method(method).corrector
             if corrector not in WITHOUT_CORRECTOR:
-                checked_corrector(with_simulated(corrector))
+                resolve_corrector(with_simulated(corrector))
 
 
 def _names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:

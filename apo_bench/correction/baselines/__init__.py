@@ -1,1 +1,1 @@
-"""What `contact` is compared with: the correctors of the paper, and what a critic would ask for."""
+"""Baselines that `contact` is compared with: the correctors of the paper, and other methods."""

@@ -9,9 +9,8 @@ CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of oper
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation
-from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.as_given import execute_as_it_ends
+from apo_bench.assembly import Correction, Observation, contact_equations
+from apo_bench.correction.checks.as_given import run_method
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -33,7 +32,7 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return execute_as_it_ends(
+    return run_method(
         observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
     )
 
@@ -42,7 +41,7 @@ def _solved(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
     space = whitened(observation)
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     prior = np.eye(6 * len(observation.poses))
 
     def residual(z: Array) -> Array:
@@ -50,7 +49,7 @@ def _solved(observation: Observation, contact_m: float) -> Array:
 
     def jacobian(z: Array) -> Array:
         _, J = system.linearised(space.poses(z))
-        return np.concatenate([space.pulled(z, J) / contact_m, prior])
+        return np.concatenate([space.pull_back(z, J) / contact_m, prior])
 
     settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
     return space.poses(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)

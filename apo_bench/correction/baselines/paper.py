@@ -1,10 +1,9 @@
 """The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
 
-from apo_bench.assembly import Correction, Observation, largest
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Observation, contact_equations, largest
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import solve_newton
 
 
@@ -17,8 +16,8 @@ def paper(observation: Observation) -> Correction:
         candidates; rank and trace are those of their joint solution.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
-    system = equations(observation.assembly, observation.start, observation.poses)
+        return refuse_correction(observation)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)

@@ -16,10 +16,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Equations, Observation, contact_equations
 from apo_bench.correction.baselines.intruding_boxes import Meeting, intruding, meeting
-from apo_bench.correction.checks.as_given import execute_as_it_ends
+from apo_bench.correction.checks.as_given import run_method
 from apo_bench.correction.solvers import Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
@@ -48,7 +47,7 @@ def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, l
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return execute_as_it_ends(
+    return run_method(
         observation,
         lambda observation: _descended(observation, contact_m, length),
         f"the descent ended after {ADAM_STEPS} steps",
@@ -73,13 +72,13 @@ class Loss:
         for system in (self.contacts, intruding(self.meetings, poses)):
             e, J = system.linearised(poses)
             value += float(e @ e) / self.contact_m**2
-            gradient = gradient + 2 * (e @ self.space.pulled(z, J)) / self.contact_m**2
+            gradient = gradient + 2 * (e @ self.space.pull_back(z, J)) / self.contact_m**2
         return value, gradient
 
 
 def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss:
     """The loss of an observation."""
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 

@@ -7,9 +7,8 @@ sense of least squares.
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation
-from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.as_given import TWIST_UNITS, execute_as_it_ends
+from apo_bench.assembly import Correction, Equations, Observation, contact_equations
+from apo_bench.correction.checks.as_given import TWIST_UNITS, run_method
 from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, Whitened
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
@@ -26,13 +25,13 @@ def snap(observation: Observation) -> Correction:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return execute_as_it_ends(observation, _snapped, "every part was put onto its newest support")
+    return run_method(observation, _snapped, "every part was put onto its newest support")
 
 
 def _snapped(observation: Observation) -> Array:
     poses = np.array(observation.poses)
     space = whitened(observation)
-    system = equations(observation.assembly, observation.start, poses)
+    system = contact_equations(observation.assembly, observation.start, poses)
     for k in range(len(poses)):
         poses[k] = _put(system.among(system.made == k), poses, k, space)
     return poses
@@ -54,7 +53,7 @@ def _put(own: Equations, poses: Array, k: int, space: Whitened) -> Array:
             break
         U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / TWIST_UNITS, full_matrices=False)
         rank = int(np.count_nonzero(w > SINGULAR_CUT_OFF * w[0]))
-        fixed = coordinates.pulled(z, Vt[:rank] * TWIST_UNITS)
+        fixed = coordinates.pull_back(z, Vt[:rank] * TWIST_UNITS)
         wanted = fixed @ z - (U[:, :rank].T @ e) / w[:rank]
         step = np.linalg.lstsq(fixed, wanted, rcond=None)[0] - z
         z = z + step

@@ -12,19 +12,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import (
-    Correction,
-    Equations,
-    Iterate,
-    Observation,
-    Step,
-    Try,
-    largest,
-)
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Correction, Equations, Iterate, Observation, Step, Try, contact_equations, largest
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
-from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
+from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
 from apo_bench.correction.solvers import Solution, solve_newton
 from apo_bench.geometry import Array
 
@@ -64,7 +55,7 @@ class TrackedOperation:
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     now = np.array(observation.poses)
     schedule = list[Step]()
     targets = list[Array]()
@@ -89,7 +80,7 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
 def next_operation(observation: Observation, poses: Array, sets: _Sets) -> TrackedOperation:
     """What one more operation asks for: the last of these poses has just been observed, the others are in force."""
     n = len(poses) - 1
-    system = equations(observation.assembly.first(n + 1), observation.start, poses)
+    system = contact_equations(observation.assembly.first(n + 1), observation.start, poses)
     failing = ~(system.gaps(poses) <= observation.gap_m)
     if not failing[system.made == n].any():
         return TrackedOperation(solve_own_contacts(system, poses, n, observation.gap_m), "converged")
@@ -123,7 +114,7 @@ def _report(
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
-    system = equations(observation.assembly, observation.start, observation.poses)
+    system = contact_equations(observation.assembly, observation.start, observation.poses)
     status = steps[-1].status if steps else "converged"
     last = next((step for step in reversed(steps) if step.trace), TrackedOperation(poses, status))
     return Correction(

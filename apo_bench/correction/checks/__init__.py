@@ -1,1 +1,1 @@
-"""What any correction is asked: is it what was agreed, how did it end, and does the stated noise explain it."""
+"""Checks of any correction: is it executable, how did it end, and does the stated noise explain it."""

@@ -4,9 +4,8 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, largest, largest_gap, project_observation
-from apo_bench.assembly.equations import equations
-from apo_bench.correction.checks.status import refused_correction, status_sentence
+from apo_bench.assembly import Correction, Observation, contact_equations, largest, largest_gap, project_observation
+from apo_bench.correction.checks.status import refuse_correction, status_sentence
 from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, demanded, least_step, violations
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
@@ -26,7 +25,7 @@ def poses_as_given(observation: Observation, poses: Array, sentence: str) -> Cor
     before = largest_gap(observation.assembly, observation.start, observation.poses)
     if not np.isfinite(poses).all():
         return Correction(observation.poses, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    e, J = equations(observation.assembly, observation.start, poses).linearised(poses)
+    e, J = contact_equations(observation.assembly, observation.start, poses).linearised(poses)
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(poses)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((poses != observation.poses).any(axis=(1, 2)))[::-1])
     after = largest(e)
@@ -41,12 +40,12 @@ def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()
         dropped: Relations, or single contacts, that do not count.
     """
     observation = project_observation(observation)
-    plain = equations(observation.assembly, observation.start, observation.poses)
+    plain = contact_equations(observation.assembly, observation.start, observation.poses)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     return largest(violations(system, exact, inequalities, poses)[observation.assembly.without(dropped)])
 
 
-def execute_as_it_ends(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
+def run_method(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
     """What a method that promises nothing makes of an observation, with the gap that it leaves in the sentence.
 
     Args:
@@ -57,7 +56,7 @@ def execute_as_it_ends(observation: Observation, method: Callable[[Observation],
         As `poses_as_given`, or `not_seen`; what was observed where there is no contact.
     """
     if not observation.observed.all():
-        return refused_correction(observation)
+        return refuse_correction(observation)
     poses = method(observation) if observation.assembly.relations() else observation.poses
     left_m = largest_gap(observation.assembly, observation.start, poses)
     return poses_as_given(observation, poses, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

@@ -10,8 +10,7 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from apo_bench.assembly import Assembly
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Assembly, contact_pattern
 from apo_bench.correction.solvers import SMALLEST, plays
 from apo_bench.geometry import Array, frozen, remembered
 
@@ -31,7 +30,7 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
     count, unit_m = plays(assembly, play_m)
-    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(pattern(assembly).begin))
+    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(contact_pattern(assembly).begin))
     return frozen(np.repeat(each, 3))
 
 
@@ -42,7 +41,7 @@ def p_value(chi_square: float, degrees: int) -> float:
     return float(chdtrc(degrees, chi_square)) if degrees else 1.0
 
 
-def softened_chi_square(z: Array, Jt: Array, S: Array) -> Array:
+def soft_chi_square(z: Array, Jt: Array, S: Array) -> Array:
     """The squared length, (b,), of corrections z, (b, 6 n), if equations may be off by covariance S, (3 c, 3 c), [m^2].
 
     Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what

@@ -27,7 +27,7 @@ def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
 
 
-def opposing(observation: Observation, correction: Correction) -> Correction:
+def check_facing(observation: Observation, correction: Correction) -> Correction:
     """A correction as it is; `inconsistent` in place of `converged` where faces that should touch look the same way."""
     if not correction.ok:
         return correction
@@ -44,7 +44,7 @@ def opposing(observation: Observation, correction: Correction) -> Correction:
     return replace(correction, status="inconsistent", sentence=sentence, covariance=None)
 
 
-def refused_correction(observation: Observation) -> Correction:
+def refuse_correction(observation: Observation) -> Correction:
     """What was observed, unchanged: an operation without a pose has no motion parameter to start from."""
     missing = int(np.argmin(observation.observed))
     now = largest_gap(observation.assembly, observation.start, observation.poses)

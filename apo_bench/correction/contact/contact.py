@@ -20,10 +20,10 @@ from apo_bench.assembly import (
     project_observations,
 )
 from apo_bench.correction.checks.chi_square import TEST_LEVEL
-from apo_bench.correction.checks.status import opposing, refused_correction, status_sentence
+from apo_bench.correction.checks.status import check_facing, refuse_correction, status_sentence
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import Solved, solve
-from apo_bench.correction.contact.starts import best_start, turned_words
+from apo_bench.correction.contact.starts import best_start, describe_turns
 from apo_bench.correction.contact.suspects import contact_suspects, suspects
 from apo_bench.correction.solvers import LARGEST_DENSE
 from apo_bench.errors import require
@@ -80,7 +80,7 @@ class ContactCorrector:
         """
         # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
         observations = project_observations(observations)
-        results = [None if all(each.observed.tolist()) else refused_correction(each) for each in observations]
+        results = [None if all(each.observed.tolist()) else refuse_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(
             6 * len(observation.poses) > LARGEST_DENSE or observation.shared or observation.tails
@@ -97,7 +97,7 @@ class ContactCorrector:
         problem = problem_of((observation,), self.level, self.compiled)
         solved = solve(problem, problem.without(dropped))[0]
         (before_m,) = problem.seen_gap_m()
-        return opposing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
+        return check_facing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
     def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
@@ -131,8 +131,8 @@ class ContactCorrector:
             dropped += (self._most_suspect(problem, kept, worst[0]),)
             kept = problem.without(dropped)
             solved = solve(problem, kept)[0]
-        report = self._report(problem, 0, solved, before_m, dropped, test, turned_words(problem, solved.poses))
-        return opposing(problem.observation, report)
+        report = self._report(problem, 0, solved, before_m, dropped, test, describe_turns(problem, solved.poses))
+        return check_facing(problem.observation, report)
 
     def _most_suspect(self, problem: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""

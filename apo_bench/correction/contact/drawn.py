@@ -30,7 +30,7 @@ def drawn_chi_squares(
         left_out: Operations whose poses are inferred, so that they agree with their contacts.
     """
     r = _drawn(observation, L, left_out) @ Jt
-    # As `softened_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
+    # As `soft_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
     A = Jt.T @ Jt
     if S is not None:
         w, V = np.linalg.eigh(S)

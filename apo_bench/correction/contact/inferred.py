@@ -12,8 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Observation, contact_kind, product
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Assembly, Contact, Observation, contact_kind, contact_pattern, product
 from apo_bench.geometry import Array, pose, quarter_turns, remembered
 
 _APART = 0.1
@@ -144,7 +143,7 @@ def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Co
     stack = np.concatenate([start, poses])
     conditions = list[_Condition]()
     others = {p + other for other in left if other != k}
-    for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
+    for word, ends in zip(contact_pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
         if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue

@@ -12,9 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Observation
-from apo_bench.assembly.equations import equations
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Assembly, Observation, contact_equations, contact_pattern
 from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
     CompactEquations,
@@ -22,7 +20,7 @@ from apo_bench.correction.solvers import (
     Kernels,
     NearestPoses,
     ProjectedContacts,
-    bounded,
+    bound_contacts,
     compact_equations,
     correction_to,
     fit_covariance,
@@ -169,8 +167,8 @@ def problem_of(
     laid = project_vertices(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
     if not demands.all_exact:
-        systems = (equations(assembly, first.start, T) for T in there)
-        inequalities = tuple(bounded(system, demands.exact, demands.low, demands.high) for system in systems)
+        systems = (contact_equations(assembly, first.start, T) for T in there)
+        inequalities = tuple(bound_contacts(system, demands.exact, demands.low, demands.high) for system in systems)
     L = np.array([noise_factor(observation) for observation in observations]) if shared else _factors(observations)
     begin = (
         None
@@ -185,7 +183,7 @@ def _demands(assembly: Assembly, play_m: float) -> _Demands:
     """What is asked of the contacts of an assembly whose parts fit with this play, [m]."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
-    plane = np.array(pattern(assembly).plane)
+    plane = np.array(contact_pattern(assembly).plane)
     plane[:, 3] -= np.where(exact, low, 0.0)
     slack_m = fit_deviation(assembly, play_m)
     return _Demands(
@@ -214,5 +212,5 @@ def _factors(observations: Sequence[Observation]) -> Array:
 def seen_system(observation: Observation) -> CompactEquations:
     """The equations of every contact, each vertex where it was observed."""
     return compact_equations(
-        equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
+        contact_equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
     )

@@ -76,7 +76,7 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
     ]
 
 
-def tested(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
+def run_test(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
     """The test of one observation."""
     if not problem.demands.exact[kept].all():
         return solve(problem, kept)[0].test

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, largest
-from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value, softened_chi_square
+from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value, soft_chi_square
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers import (
@@ -27,7 +27,7 @@ def chi_squares(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestPos
     S = problem.play_covariance(chosen)
     if S is not None:
         Jt = nearest.Jt if isinstance(nearest.Jt, np.ndarray) else nearest.Jt[0].toarray()[None]
-        return softened_chi_square(nearest.z, Jt, S), holds
+        return soft_chi_square(nearest.z, Jt, S), holds
     if problem.demands.slack_m is not None and problem.slack(chosen).any():
         holds[:] = False
     return np.square(nearest.z).sum(axis=1), holds

@@ -10,8 +10,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly import faces_away, largest
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import contact_pattern, faces_away, largest
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
@@ -19,7 +18,7 @@ from apo_bench.correction.solvers import (
     LARGEST_DENSE,
     LARGEST_POSTERIOR,
     correction_to,
-    descended,
+    descend_to_nearest,
     nearest_poses,
     project_vertices,
     scales,
@@ -58,7 +57,7 @@ def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
     return problem, first
 
 
-def turned_words(problem: Problem, poses: Array) -> str:
+def describe_turns(problem: Problem, poses: Array) -> str:
     """State which operations were observed turned, if another start was needed to find the corrected poses."""
     if problem.begin is None:
         return ""
@@ -113,7 +112,7 @@ def _doubted(problem: Problem, first: Solved) -> Collection[int]:
         return range(n)
     bad = faces_away(observation.assembly, observation.start, first.poses)
     bad |= ~(first.gaps <= observation.gap_m)
-    letters = pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
+    letters = contact_pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
     turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.poses[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
@@ -145,4 +144,4 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield poses[i]
         else:
-            yield descended(system.only(int(i)), observation.poses, L, poses[i])
+            yield descend_to_nearest(system.only(int(i)), observation.poses, L, poses[i])

@@ -16,7 +16,7 @@ from apo_bench.assembly import (
     Suspect,
 )
 from apo_bench.correction.contact.problem import Problem
-from apo_bench.correction.contact.solved import pull, tested
+from apo_bench.correction.contact.solved import pull, run_test
 
 MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
@@ -60,7 +60,7 @@ def _ranked(
     for name, group in groups:
         rest = kept.copy()
         rest[list(group)] = False
-        test = tested(problem, rest)
+        test = run_test(problem, rest)
         contacts = tuple(dict.fromkeys(problem.observation.assembly.given(relations[j].contact) for j in group))
         numbers = test.chi_square, test.freedom, test.p_value
         ranked.append(Suspect(name, contacts, relations[group[0]].made, *numbers))

@@ -7,8 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Observation
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Observation, contact_pattern
 from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
@@ -17,8 +16,8 @@ from apo_bench.correction.robust.hypotheses import (
     assumed_observation,
     prior_surprise,
     soft_deviation,
-    softened,
-    untrusted,
+    soften,
+    untrusted_operations,
 )
 from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 
@@ -32,11 +31,11 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assum
     Args:
         assumed: The `assumed_observation` of the states.
     """
-    left_out = untrusted(states)
+    left_out = untrusted_operations(states)
     wide = np.array(assumed.covariance)
     wide[list(left_out)] = ROOM
     e, Jt = linearised_by(seen_system(assumed), assumed.poses, noise_factor(replace(assumed, covariance=wide)))
-    _, soft = softened(assumed, dropped)
+    _, soft = soften(assumed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)
     beyond = _beyond_linear(assumed, left_out)
@@ -57,13 +56,13 @@ class ContactAgreement:
 
     def __init__(self, case: Case, states: States) -> None:
         seen = assumed_observation(case, states)
-        self._unknown = untrusted(states)
+        self._unknown = untrusted_operations(states)
         system = seen_system(seen)
         self._e, self._Jt = linearised_by(system, seen.poses, noise_factor(seen))
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
-        letters = pattern(seen.assembly).letters - len(seen.assembly.solids)
+        letters = contact_pattern(seen.assembly).letters - len(seen.assembly.solids)
         c = len(system)
         self._uses = (letters[..., None] == np.arange(len(seen.poses))).any(axis=1)
         # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Observation, measure_round, placements
-from apo_bench.correction.solvers import settled_basis
+from apo_bench.correction.solvers import settle_basis
 from apo_bench.geometry import Array, Face, RoundFace, face_area, intrusion, overlap_area, pose
 
 PLACES_TRIED = 24
@@ -93,7 +93,7 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
     w = w[free]
     V = V[:, free]
     new = np.flatnonzero(np.diff(w) > _EQUAL * w[1:]) + 1
-    axes = np.hstack([settled_basis(group) for group in np.split(V, new, axis=1)])
+    axes = np.hstack([settle_basis(group) for group in np.split(V, new, axis=1)])
     z = norm.ppf(qmc.Halton(int(free.sum()), scramble=False).random(number + 1)[1:])
     twists = (z[np.argsort((z * z).sum(axis=1))] * np.sqrt(w)) @ axes.T / _WEIGHTS
     yield from goal @ pose.exp(twists)

@@ -15,8 +15,15 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, faces_away
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import (
+    Consistency,
+    Correction,
+    Observation,
+    OutlierModel,
+    SharedError,
+    contact_pattern,
+    faces_away,
+)
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
@@ -26,12 +33,12 @@ from apo_bench.correction.robust.beliefs import DISPLACED, INLIER, ROOM, VIEW, S
 from apo_bench.correction.robust.noise_scale import (
     LEAST,
     likeliest_scale,
-    noisier,
     region_scale,
+    scale_noise,
     scale_surprise,
     scaled_test,
 )
-from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merged
+from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merge_views
 from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
@@ -56,12 +63,12 @@ class Case:
     model: OutlierModel
     _merged: dict[tuple[int, State, int | None], Merged] = field(default_factory=dict, init=False, repr=False)
 
-    def merged(self, k: int, state: State, exchanged: int | None = None) -> Merged:
-        """`views.merged` of operation k, each asked once; `exchanged` is the operation whose view belongs to it."""
+    def merge_views(self, k: int, state: State, exchanged: int | None = None) -> Merged:
+        """`views.merge_views` of operation k, once each; `exchanged` is the operation whose view belongs to it."""
         key = k, state, exchanged
         if key not in self._merged:
             other = None if exchanged is None else self.views[exchanged][0]
-            self._merged[key] = merged(self.views[k], state, self.model, other)
+            self._merged[key] = merge_views(self.views[k], state, self.model, other)
         return self._merged[key]
 
 
@@ -88,7 +95,7 @@ class SolvedHypothesis:
     @property
     def left_out(self) -> tuple[int, ...]:
         """Operations of which no view is assumed."""
-        return untrusted(self.states)
+        return untrusted_operations(self.states)
 
     @property
     def doubts(self) -> bool:
@@ -115,7 +122,7 @@ class SolvedHypothesis:
         xi = pose.log(pose.inverse(observation.poses) @ correction.poses)
         L = noise_factor(replace(observation, covariance=wide))
         _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
-        wrong, soft = softened(observation, self.dropped)
+        wrong, soft = soften(observation, self.dropped)
         false = np.where(wrong, system.residual(correction.poses) / soft, 0.0) if self.dropped else np.zeros(len(soft))
         S = Jt.T @ Jt + np.diag(soft * soft)
         unlikely = correction.test.chi_square / self.scale**2 + false @ false + np.linalg.slogdet(S)[1]
@@ -124,7 +131,7 @@ class SolvedHypothesis:
             surprise += scale_surprise(self.scale, correction.test.freedom)
         return float(unlikely + surprise)
 
-    def noisier(self) -> SolvedHypothesis:
+    def scale_noise(self) -> SolvedHypothesis:
         """The same if all noise is larger than stated, by as much as is likeliest: the poses stay."""
         test = self.correction.test
         if test is None or self.scale > 1.0 or self.observation.shared:
@@ -135,7 +142,7 @@ class SolvedHypothesis:
     @property
     def stated(self) -> Observation:
         """What is assumed with the noise that is."""
-        return noisier(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
+        return scale_noise(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
 
     @property
     def covariance(self) -> Array | None:
@@ -150,7 +157,7 @@ class SolvedHypothesis:
     def at(self, poses: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred poses of some operations elsewhere, at these of poses (n, 4, 4)."""
         moved = self._moved(poses, unknown)
-        correction = tested(moved, _corrected(moved, self.dropped), self.left_out)
+        correction = retest(moved, _corrected(moved, self.dropped), self.left_out)
         return replace(self, observation=moved, correction=correction)
 
     def poses_at(self, poses: Array, unknown: Sequence[int]) -> Array | None:
@@ -184,18 +191,18 @@ class SolvedHypothesis:
         return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
-def untrusted(states: States) -> tuple[int, ...]:
+def untrusted_operations(states: States) -> tuple[int, ...]:
     """Operations of which no view is assumed."""
     return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
 def prior_surprise(case: Case, states: States, dropped: tuple[str, ...]) -> float:
     """-2 log of how likely states are, and the views in them, without contacts; relative to all as stated."""
-    each = sum(case.merged(k, state).surprise for k, state in enumerate(states))
+    each = sum(case.merge_views(k, state).surprise for k, state in enumerate(states))
     return each + together(states, case.model) + len(dropped) * case.model.relation_surprise
 
 
-def softened(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[np.bool_], Array]:
+def soften(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[np.bool_], Array]:
     """Which equations are those of wrong relations, (3 c,), and how far each may be from nominal, (3 c,), [m].
 
     Faces of a wrong relation are anywhere: its equations deviate by their distance, not by what play leaves.
@@ -204,7 +211,7 @@ def softened(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArra
     if not dropped:
         return np.zeros(len(soft), dtype=np.bool_), soft
     wrong = np.repeat(~observation.assembly.without(dropped), 3)
-    each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
+    each = np.repeat(np.sqrt(np.diff(contact_pattern(observation.assembly).begin)), 3) * _WRONG_M
     return wrong, np.where(wrong, each, soft)
 
 
@@ -220,11 +227,11 @@ def hypothesis(
         assumed = assumed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
     correction = as_stated(assumed) if trusted else _corrected(assumed, dropped)
-    return SolvedHypothesis(case, states, dropped, assumed, tested(assumed, correction, untrusted(states)))
+    return SolvedHypothesis(case, states, dropped, assumed, retest(assumed, correction, untrusted_operations(states)))
 
 
-def tested(assumed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
-    """With the test of what was observed alone: directions that only left-out operations could tell of are not tested.
+def retest(assumed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
+    """With the test of what was observed alone: directions that only left-out operations could show are not tested.
 
     What is inferred agrees with its contacts, so these operations add nothing to the squared length, and the rank of
     their own columns is no degree of freedom.
@@ -261,7 +268,7 @@ def assumed_observation(case: Case, states: States) -> Observation:
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, state in enumerate(states):
-        every = case.merged(k, state, exchanged_with(state))
+        every = case.merge_views(k, state, exchanged_with(state))
         if every.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN

@@ -24,7 +24,7 @@ from apo_bench.correction.robust.beliefs import (
     swapped_with,
 )
 from apo_bench.correction.robust.hypotheses import UNKNOWN, Case, SolvedHypothesis
-from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
+from apo_bench.correction.robust.views import Sightings, exchanged_view, merge_views
 from apo_bench.geometry import Array, pose
 
 _MOST_READINGS = 3
@@ -37,7 +37,7 @@ _WIDER = 2
 """Operations by which a row of displaced ones is made longer at either end."""
 
 
-def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
+def change_states(states: States, which: Sequence[int], to: Sequence[State]) -> States:
     """With the states of some operations replaced."""
     new = dict(zip(which, to, strict=True))
     return tuple(new.get(k, state) for k, state in enumerate(states))
@@ -82,10 +82,12 @@ def swaps(case: Case, states: States) -> Iterator[States]:
     for k in sorted(doubted):
         for i in case.views[k][0].others if states[k] else ():
             if states[i] and not (i in doubted and i < k) and (i in doubted or solids[i] is solids[k]):
-                yield changed(states, (k, i), ((swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:])))
+                yield change_states(
+                    states, (k, i), ((swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:]))
+                )
 
 
-def continued(views: Sightings, states: States, model: OutlierModel) -> States:
+def continue_states(views: Sightings, states: States, model: OutlierModel) -> States:
     """States of the earlier views, with the likeliest of the later ones: right, anywhere, or false again."""
     grown = list[State]()
     for own, state in zip(views, states, strict=True):
@@ -93,12 +95,12 @@ def continued(views: Sightings, states: States, model: OutlierModel) -> States:
         for j in range(len(state), len(own)):
             exchanged = exchanged_view(views, now)
             every = [(*now, belief) for belief in dict.fromkeys((INLIER, GROSS, *now[:1])) if belief >= 0]
-            now = min(every, key=lambda one: merged(own[: j + 1], one, model, exchanged).surprise)
+            now = min(every, key=lambda one: merge_views(own[: j + 1], one, model, exchanged).surprise)
         grown.append(now)
     return tuple(grown)
 
 
-def displaced_together(states: States) -> Iterator[States]:
+def displace_together(states: States) -> Iterator[States]:
     """With operations in a row displaced together: those in doubt, and some of their neighbours."""
     alone = [len(state) == 1 for state in states]
     doubted = [k for k, state in enumerate(states) if alone[k] and is_false(state[0])]
@@ -113,18 +115,18 @@ def displaced_together(states: States) -> Iterator[States]:
     # One operation less at either end of a row.
     displaced = [k for k in doubted if states[k] == (DISPLACED,)]
     if len(displaced) > 2:
-        yield from (changed(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
+        yield from (change_states(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
 
 
 def false_together(case: Case, start: States) -> Iterator[States]:
     """All operations seen anywhere, any two exchanged, any row displaced: where no set without the rest agrees."""
     seen = [k for k, state in enumerate(start) if state]
-    yield changed(start, seen, [(GROSS,) * len(start[k]) for k in seen])
+    yield change_states(start, seen, [(GROSS,) * len(start[k]) for k in seen])
     for k in seen:
         for i in case.views[k][0].others:
             if i > k and start[i]:
-                yield changed(start, (k, i), ((swapped_with(i), *start[k][1:]), (swapped_with(k), *start[i][1:])))
+                yield change_states(start, (k, i), ((swapped_with(i), *start[k][1:]), (swapped_with(k), *start[i][1:])))
     for row in combinations(range(len(start)), 2):
         between = range(row[0], row[1] + 1)
         if all(len(start[k]) == 1 for k in between):
-            yield changed(start, between, [(DISPLACED,)] * len(between))
+            yield change_states(start, between, [(DISPLACED,)] * len(between))

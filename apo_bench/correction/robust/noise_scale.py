@@ -58,7 +58,7 @@ def scaled_test(test: Consistency, scale: float) -> Consistency:
     return replace(test, chi_square=chi_square, freedom=freedom, p_value=p_value(chi_square, freedom))
 
 
-def noisier(observation: Observation, scale: float) -> Observation:
+def scale_noise(observation: Observation, scale: float) -> Observation:
     """An observation that states so many times its noise."""
     shared = tuple(replace(error, covariance=error.covariance * scale**2) for error in observation.shared)
     tails = observation.tails

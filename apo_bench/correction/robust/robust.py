@@ -19,16 +19,16 @@ from apo_bench.assembly import (
     project_observations,
 )
 from apo_bench.correction.checks.chi_square import TEST_LEVEL
-from apo_bench.correction.checks.status import refused_correction
+from apo_bench.correction.checks.status import refuse_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.mixture import mode_covariance
-from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
+from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, region_scale, scale_noise, scale_words
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import looked_again, views_of
+from apo_bench.correction.robust.views import add_views, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
@@ -95,11 +95,11 @@ class RobustCorrector:
             doubted = baseless or unsure(search, best)
             if reobserve is None or not reobserve.left or not doubted:
                 break
-            views = looked_again(views, reobserve(doubted), observation, model)
+            views = add_views(views, reobserve(doubted), observation, model)
             again += doubted
         if best is None:
-            return contact_apply(observation) if observation.observed.all() else refused_correction(observation)
-        return _report(observation, first or best, search, with_room(best).noisier(), again)
+            return contact_apply(observation) if observation.observed.all() else refuse_correction(observation)
+        return _report(observation, first or best, search, with_room(best).scale_noise(), again)
 
     def _model(self, observation: Observation) -> OutlierModel:
         return self.outliers or observation.outliers or OutlierModel()
@@ -122,7 +122,7 @@ class RobustCorrector:
             correction,
             sentence=correction.sentence + scale_words(scale),
             covariance=None if C is None else C * region_scale(scale, test.freedom) ** 2,
-            assumed=noisier(observation, region_scale(scale, test.freedom)),
+            assumed=scale_noise(observation, region_scale(scale, test.freedom)),
             noise_scale=scale,
         )
 
@@ -189,7 +189,7 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
         # Noise that is larger than stated leaves the poses, so it is no other hypothesis.
         what = solved.states, solved.dropped
         weights[what] = weights.get(what, 0.0) + weight
-        solved_by.setdefault(what, solved.noisier())
+        solved_by.setdefault(what, solved.scale_noise())
     weighted = sorted(
         ((weight, solved_by[what]) for what, weight in weights.items()), key=lambda one: (one[1] is not best, -one[0])
     )

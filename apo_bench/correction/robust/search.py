@@ -14,8 +14,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Observation
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Observation, contact_pattern
 from apo_bench.correction.contact.suspects import contacts_of
 from apo_bench.correction.robust.agreement import ContactAgreement, expected_badness
 from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
@@ -26,9 +25,9 @@ from apo_bench.correction.robust.hypotheses import (
     hypothesis,
 )
 from apo_bench.correction.robust.nearby import (
-    changed,
-    continued,
-    displaced_together,
+    change_states,
+    continue_states,
+    displace_together,
     false_together,
     likely_beliefs,
     swaps,
@@ -86,7 +85,7 @@ class Search:
             return min(self._known(), key=_badness)
         best = None
         if known is not None:
-            best = self._try(continued(self._case.views, known.states, self._case.model), known.dropped)
+            best = self._try(continue_states(self._case.views, known.states, self._case.model), known.dropped)
             self._refined(best)
             best = min(self._known(), key=_badness, default=None)
         if best is None or best.p_value < self._level or best.dropped:
@@ -103,8 +102,8 @@ class Search:
     def _rescaled(self) -> None:
         """What if noise is larger than stated: all that was observed assumed, or what is likeliest."""
         for one in (self.first, min(self._known(), key=_badness, default=None)):
-            if one is not None and (noisier := one.noisier()).scale > one.scale:
-                self._solved[noisier.key] = noisier
+            if one is not None and (scale_noise := one.scale_noise()).scale > one.scale:
+                self._solved[scale_noise.key] = scale_noise
 
     def share(self, best: SolvedHypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
@@ -202,7 +201,7 @@ class Search:
         for some in self._grown(size, rest):
             rated = sorted(((rest.agreement(s), s) for s in some), key=lambda set_: (-set_[0], set_[1]))
             agreeing = [s for p, s in rated if p >= _LENIENT]
-            every = (changed(start, s, to) for s in agreeing for to in product(*(other[k] for k in s)))
+            every = (change_states(start, s, to) for s in agreeing for to in product(*(other[k] for k in s)))
             yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
 
     def _grown(self, size: dict[int, int], rest: ContactAgreement) -> Iterator[list[tuple[int, ...]]]:
@@ -247,25 +246,25 @@ class Search:
                 # Of several views of an operation that is in doubt the one that is assumed may be the false one.
                 if now == DISPLACED or set(state) == {INLIER}:
                     continue
-                blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
+                blank = change_states(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
                 yield blank
                 for belief in likely_beliefs(self._case, self._try(blank, best.dropped), k, views[i]):
-                    yield changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),))
+                    yield change_states(states, (k,), ((*state[:i], belief, *state[i + 1 :]),))
         yield from swaps(self._case, states)
-        yield from displaced_together(states)
+        yield from displace_together(states)
 
     def _instead(self, best: SolvedHypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
         doubted = [k for k, state in enumerate(best.states) if any(map(is_false, state))]
         for k in () if best.dropped else doubted:
-            states = changed(best.states, (k,), (self._believed(k),))
+            states = change_states(best.states, (k,), (self._believed(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
         """Relations, and single contacts of them, without which the rest agrees; or those an operation is part of."""
         assembly = self._case.observation.assembly
         rest = ContactAgreement(self._case, states)
-        letters = pattern(assembly).letters - len(assembly.solids)
+        letters = contact_pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
             # What agrees without one contact agrees without the whole relation, but for the share of false alarms.
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:

@@ -53,10 +53,10 @@ Sightings = tuple[tuple[Sighting, ...], ...]
 
 def views_of(observation: Observation, model: OutlierModel | None = None) -> Sightings:
     """What was observed, once at most."""
-    return looked_again(((),) * len(observation.poses), observation, observation, model)
+    return add_views(((),) * len(observation.poses), observation, observation, model)
 
 
-def looked_again(
+def add_views(
     views: Sightings, observation: Observation, first: Observation, model: OutlierModel | None = None
 ) -> Sightings:
     """With what was observed this time; `first` is the first look, which says where parts were before."""
@@ -94,7 +94,9 @@ def _before(first: Observation) -> list[tuple[Array, Array] | None]:
     return found
 
 
-def merged(views: Sequence[Sighting], state: State, model: OutlierModel, exchanged: Sighting | None = None) -> Merged:
+def merge_views(
+    views: Sequence[Sighting], state: State, model: OutlierModel, exchanged: Sighting | None = None
+) -> Merged:
     """What the views of one operation say together; `exchanged` is the view of another one that belongs to this."""
     pairs = [
         (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
@@ -140,7 +142,7 @@ def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float,
     rated = []
     for group in groups:
         state = tuple(INLIER if i in group else false[i] for i in range(m))
-        rated.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
+        rated.append((round(merge_views(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
     likely = min(rated)[0] + _IMPOSSIBLE
     return [
         (unlikely, state) for unlikely, _, state in sorted(rated) if unlikely < likely or all(map(says_nothing, state))

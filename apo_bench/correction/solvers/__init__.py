@@ -5,14 +5,14 @@ from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, N
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,
-    bounded,
+    bound_contacts,
     demanded,
     nearest_between,
     violations,
 )
 from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
-from apo_bench.correction.solvers.newton_descent import descended
+from apo_bench.correction.solvers.newton_descent import descend_to_nearest
 from apo_bench.correction.solvers.play import fit_covariance, plays
 from apo_bench.correction.solvers.posterior import (
     LARGEST_POSTERIOR,
@@ -22,7 +22,7 @@ from apo_bench.correction.solvers.posterior import (
     jacobian_rank,
     marginals,
     projections,
-    settled_basis,
+    settle_basis,
 )
 from apo_bench.correction.solvers.projected_contacts import ProjectedContacts, project_vertices
 from apo_bench.correction.solvers.whitened import (
@@ -51,12 +51,12 @@ __all__ = (
     "Solution",
     "Whitened",
     "active_rank",
-    "bounded",
+    "bound_contacts",
     "compact_equations",
     "coordinates_of",
     "correction_to",
     "demanded",
-    "descended",
+    "descend_to_nearest",
     "fit_covariance",
     "freedom_of",
     "jacobian_rank",
@@ -70,7 +70,7 @@ __all__ = (
     "project_vertices",
     "projections",
     "scales",
-    "settled_basis",
+    "settle_basis",
     "solve_batch",
     "solve_newton",
     "twists_of",

@@ -19,7 +19,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestPoses, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import poses_at, shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
-from apo_bench.correction.solvers.whitened import pulled
+from apo_bench.correction.solvers.whitened import pull_back
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 
@@ -79,7 +79,7 @@ def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equa
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
     low, high = project_round_faces(assembly).intervals(play_m).T
     exact = low == high
-    inequalities = bounded(system, exact, low, high)
+    inequalities = bound_contacts(system, exact, low, high)
     if exact.all() and not low.any():
         return system, exact, inequalities
     plane = np.array(system.plane)
@@ -87,7 +87,7 @@ def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equa
     return replace(system, plane=plane), exact, inequalities
 
 
-def bounded(system: Equations, exact: NDArray[np.bool_], low: Array, high: Array) -> Inequalities:
+def bound_contacts(system: Equations, exact: NDArray[np.bool_], low: Array, high: Array) -> Inequalities:
     """The inequalities of contacts that are no equations, (c,), between their distances low and high, (c,), [m]."""
     walls = system.among(~exact)
     return Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact])
@@ -130,7 +130,7 @@ def nearest_between(
         nearest = _settled(e, Jt, z)
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = inequalities.system.linearised(T)
-        J_wall = pulled(J_wall.reshape(len(inequalities), -1), B)
+        J_wall = pull_back(J_wall.reshape(len(inequalities), -1), B)
         # Where walls will be at that z; the program moves on in the free directions alone, z = nearest + free u.
         ahead = e_wall + J_wall @ (nearest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
@@ -168,7 +168,7 @@ def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) ->
     """
     e, J = inequalities.system.linearised(nearest.poses)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
-    J = pulled(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
+    J = pull_back(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 
 

@@ -24,7 +24,7 @@ _FLAT = 1e-6
 """Curvature along a free direction, at least: 1 where contacts do not bend."""
 
 
-def descended(system: CompactEquations, observed: Array, L: Array, poses: Array) -> Array:
+def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, poses: Array) -> Array:
     """The nearest poses near consistent ones, (n, 4, 4).
 
     Args:

@@ -43,7 +43,7 @@ class Freedom:
     spectral_gap: float
     """The smallest singular value that counts over the largest that does not; infinite if every one counts."""
     free: Array
-    """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z, by `settled_basis`."""
+    """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z, by `settle_basis`."""
 
 
 def freedom_of(Jt: Any) -> Freedom | None:
@@ -63,10 +63,10 @@ def freedom_of(Jt: Any) -> Freedom | None:
     rank = int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
     left = w[rank:].max(initial=0.0)
     gap = float(w[rank - 1] / left) if rank and left > 0.0 else np.inf
-    return Freedom(rank, equations_ - rank, gap, settled_basis(U[:, rank:]))
+    return Freedom(rank, equations_ - rank, gap, settle_basis(U[:, rank:]))
 
 
-def settled_basis(N: Array) -> Array:
+def settle_basis(N: Array) -> Array:
     """The orthonormal basis of a span that is nearest to axes (orthogonal Procrustes; Schoenemann, 1966).
 
     A decomposition returns some basis of a null space; rounding decides which. This one depends on the span alone.

@@ -6,8 +6,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Pattern
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import Assembly, Pattern, contact_pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
 from apo_bench.correction.solvers.word_products import Words
 from apo_bench.geometry import Array, pose, remembered
@@ -82,7 +81,7 @@ class _Corners(NamedTuple):
 
 @remembered
 def _corners(assembly: Assembly) -> _Corners:
-    known = pattern(assembly)
+    known = contact_pattern(assembly)
     normal = np.array(known.onto)
     normal[:, 3] = 0.0
     return _Corners(

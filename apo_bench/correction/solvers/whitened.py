@@ -28,9 +28,9 @@ class Whitened:
         """T_seen exp(L z), (n, 4, 4)."""
         return np.asarray(self.observed @ pose.exp(twists_of(self.factor, z)))
 
-    def pulled(self, z: Array, J: Array) -> Array:
+    def pull_back(self, z: Array, J: Array) -> Array:
         """A derivative by the body twists of the poses at z, (m, 6 n), as the derivative by z."""
-        return pulled(J, right_jacobian(twists_of(self.factor, z)) @ self.factor)
+        return pull_back(J, right_jacobian(twists_of(self.factor, z)) @ self.factor)
 
 
 def whitened(observation: Observation) -> Whitened:
@@ -59,7 +59,7 @@ def coordinates_of(L: Array, xi: Array) -> Array:
     return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(flat))
 
 
-def pulled(J: Array, B: Array) -> Array:
+def pull_back(J: Array, B: Array) -> Array:
     """A derivative by body twists, (m, 6 n), as one by z, (m, 6 n), of which B z are the body twists."""
     m = len(J)
     n = len(B)

@@ -1,23 +1,16 @@
-"""How a part comes into its contacts: the macros, and the straight line on which it arrives.
-
-The straight line on which a part comes to its goal.
-
-Operations understood: the contact state before and after each, and the macros that lead from one to the other.
-
-States and macros are those of the nominal goals; a plan with other motion parameters has the same macros in the same
-directions of its parts, so that a minor change is made by replacing one part of the plan.
-"""
+"""How a part comes into its contacts: its macros, and the straight line on which it arrives."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain as chained
 from itertools import product
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, TouchedContact, corners, mouth, placements, touched_contacts
-from apo_bench.geometry import Array, Posed, copyable, exit_distance, extent, freeze, is_way_free
+from apo_bench.assembly import Assembly, Contact, Poses, TouchedContact, corners, mouth, touched_contacts
+from apo_bench.geometry import Array, Posed, exit_distance, extent, freeze, is_way_free
+from apo_bench.planning.insertion.attach import ANY, Attach, Preference
 from apo_bench.planning.insertion.macros import UP, Chain, Macro, Way, chain, departure
 from apo_bench.planning.insertion.states import (
     ANGLE_RAD,
@@ -28,35 +21,6 @@ from apo_bench.planning.insertion.states import (
     screw_state,
     snap_normals,
 )
-
-
-@final
-@copyable
-@dataclass(frozen=True, eq=False)
-class Attach:
-    """The straight line on which a part comes to its goal."""
-
-    direction: Array
-    """Unit vector of the motion, (3,), in the frame of the main part at its goal."""
-    travel_m: float
-    """How far before the goal the line begins."""
-
-    def __post_init__(self) -> None:
-        freeze(self, direction=(3,))
-
-    @property
-    def stated(self) -> "Preference":
-        """The whole line as a preference."""
-        return Preference(self.direction, self.travel_m)
-
-
-class Preference(NamedTuple):
-    """What of a line of attach is stated; the rest is left to the plan."""
-
-    direction: Array | None = None
-    """The direction of the line, (3,), as in `Attach`; None where it is not stated."""
-    travel_m: float | None = None
-
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
@@ -71,7 +35,6 @@ CLEAR_M = 0.3
 _LIFTED = 0.1
 """A contact opens when the part is lifted if the sine of its normal to the level is above this."""
 _SAME = 1e-9
-ANY = Preference()
 
 
 @final
@@ -265,69 +228,3 @@ def _shifted(T: Array, by: Array) -> Array:
     out = np.array(T)
     out[:3, 3] += by
     return out
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class OperationMacros:
-    """One operation, in terms of macros."""
-
-    operation: int
-    """Counted from 0."""
-    main: str
-    carries: tuple[str, ...]
-    before: Arrival
-    """How the part would come to where it is taken from: undoing the operation does that."""
-    after: Arrival
-    """How it comes to its goal."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The macros in their order, such as `depart`, `move-to-contact`."""
-        return tuple(macro.name for macro in (*self.before.departs, *self.after.macros))
-
-
-def understand(
-    assembly: Assembly,
-    start: Poses,
-    goals: Array,
-    stated: Sequence[Preference] = (),
-    angle_rad: float = ANGLE_RAD,
-) -> tuple[OperationMacros, ...]:
-    """Every operation.
-
-    Args:
-        start: Poses before the first operation, z upwards, [m].
-        goals: (n, 4, 4), in the same frame, [m].
-        stated: Lines of attach to be preferred, each in the frame of its main part; one that leads through a contact
-            is not.
-        angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
-    """
-    stages = (start, *placements(assembly, start, goals))
-    lines = tuple(stated) or (ANY,) * len(assembly)
-    understood: list[OperationMacros] = []
-    put: dict[str, int] = {}
-    for k, operation in enumerate(assembly.operations):
-        was = _held_by(assembly, put.get(operation.main), operation.moves)
-        back = (
-            ANY
-            if was is None
-            else Preference(understood[was].after.line.direction, understood[was].after.line.travel_m)
-        )
-        before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
-        after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
-        understood.append(OperationMacros(k, operation.main, operation.carries, before, after))
-        put[operation.main] = k
-    return tuple(understood)
-
-
-def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
-    """The operation `was`, out of whose contacts a part must be brought; None if all of them move along."""
-    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
-        return None
-    return was
-
-
-def _lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
-    """The contacts that operation k breaks: undoing it makes them again."""
-    return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Literal, final
 
 from apo_bench.assembly import Plan
-from apo_bench.planning.insertion.arrival import Attach
+from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.measures import ArmMove, MeasureCode, measures
 from apo_bench.records import Thresholds
 

@@ -31,17 +31,9 @@ from apo_bench.assembly import (
     placements,
 )
 from apo_bench.geometry import Array
-from apo_bench.planning.insertion.arrival import Attach
-from apo_bench.planning.prediction.resting import (
-    between,
-    depths_from_above,
-    depths_on_way,
-    enters,
-    is_support,
-    physical_solids,
-    residual,
-    resting_poses,
-)
+from apo_bench.planning.insertion.attach import Attach
+from apo_bench.planning.prediction.interference import depths_from_above, depths_on_way, physical_solids
+from apo_bench.planning.prediction.resting import between, enters, is_support, residual, resting_poses
 from apo_bench.planning.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
 

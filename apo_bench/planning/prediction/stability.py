@@ -88,8 +88,8 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     points = points[carrying]
     forces = forces[carrying]
     # Six equations, sum f n = up and sum f (p - c) x n = 0 over 10 mm, with f >= 0.
-    ft_sensor = [np.concatenate([forces, np.cross((points - c) / _ARM_M, forces)], axis=1).T for c in at]
-    return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in ft_sensor)
+    wrenches = [np.concatenate([forces, np.cross((points - c) / _ARM_M, forces)], axis=1).T for c in at]
+    return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
 
 def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:

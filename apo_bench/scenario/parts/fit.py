@@ -1,11 +1,11 @@
-"""A part some of whose faces recede although its file does not say so."""
+"""Mark faces of a part as fit, so that they recede by the clearance."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.errors import require_known
-from apo_bench.geometry import Face, RoundFace, Solid, receded_pieces
+from apo_bench.geometry import Face, RoundFace, Solid, recede_pieces
 from apo_bench.scenario.parts.agreement import check_receding
 
 
@@ -22,8 +22,8 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
 
     Raises:
-        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
-            piece.
+        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or
+            nothing is left of a piece.
     """
     for face in undersizes_mm:
         require_known("face", face, (*solid.faces, *solid.rounds), place="fit")
@@ -32,7 +32,7 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}
         flats = {name: replace(face, fit=name in names) for name, face in solid.faces.items()}
         walls = {name: replace(face, fit=name in names) for name, face in solid.rounds.items()}
-        pieces = receded_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
+        pieces = recede_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
     fitted = replace(
         solid,
         pieces=pieces,

@@ -7,7 +7,8 @@ import numpy as np
 
 from apo_bench.assembly import Operation, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.arrival import Arrival, Attach
+from apo_bench.planning.insertion.arrival import Arrival
+from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.insertion.macros import MacroName
 from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot import translate, with_height

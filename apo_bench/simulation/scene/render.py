@@ -26,7 +26,7 @@ _VIDEO_ENDINGS = (".mp4", ".gif")
 
 
 @check_arguments
-def picture(
+def draw_picture(
     scene: Scene,
     poses: Poses,
     width: int = 640,
@@ -37,7 +37,7 @@ def picture(
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
-        camera: `overview`, `close`, `top`, or a `camera_view`.
+        camera: `overview`, `close`, `top`, or a `aim_camera`.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
@@ -93,7 +93,7 @@ def arm_home(scene: Scene, data: Any) -> None:
 
 
 @check_arguments
-def camera_view(
+def aim_camera(
     look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
 ) -> SceneCamera:
     """A camera that looks at a point of the world, (3,), [m]."""
@@ -127,7 +127,7 @@ class Film:
         """
         middle = np.array([*scene.scenario.site.center_m, 0.08])
         self.fps = fps
-        self.camera = camera or camera_view(middle, 0.85, 128.0, -24.0)
+        self.camera = camera or aim_camera(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         _check_camera(scene.work, self.camera)
         self._renderer = renderer(scene.work.model, width, height)
@@ -239,7 +239,7 @@ def _draw(
 def _check_camera(world: World, camera: SceneCamera) -> None:
     names = [world.model.camera(i).name for i in range(world.model.ncam)]
     if isinstance(camera, str):
-        require_known("camera", camera, names, rest=" Or give a camera_view.")
+        require_known("camera", camera, names, rest=" Or give a aim_camera.")
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:

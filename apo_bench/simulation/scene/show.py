@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import placements
 from apo_bench.scenario import Scenario, layout_at, load_scenario
-from apo_bench.simulation.scene.render import SceneCamera, picture
+from apo_bench.simulation.scene.render import SceneCamera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 
 
@@ -21,10 +21,10 @@ def show_scenario(
     Args:
         scenario: A name, the path of a scenario file, or the scenario itself.
         finished: Whether the parts are assembled at their nominal poses; if not, they are at their starts.
-        camera: As in `picture`.
+        camera: As in `draw_picture`.
     """
     loaded = load_scenario(scenario)
     x, y = loaded.site.center_m
     layout = layout_at(loaded, x, y, float(np.mean(loaded.site.yaw_rad)))
     poses = placements(loaded.assembly, layout.start, layout.poses)[-1] if finished else layout.start
-    return picture(build_scene(loaded), poses, camera=camera)
+    return draw_picture(build_scene(loaded), poses, camera=camera)

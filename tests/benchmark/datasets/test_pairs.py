@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
-from apo_bench.assembly import Demonstration, Layout
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Demonstration, Layout, contact_equations
 from apo_bench.benchmark.datasets import drawing, endless_pairs, pairs
 from apo_bench.benchmark.datasets.drawing import by_part, observe_many
 from apo_bench.benchmark.scoring.track import read_tracks
@@ -81,7 +80,7 @@ def test_every_contact_of_the_truth_holds(name: str) -> None:
     np.testing.assert_array_equal(many.truth, layouts.goals)
     for i, goals in enumerate(many.truth):
         start = {part: poses[i] for part, poses in layouts.start.items()}
-        assert np.abs(equations(scenario.assembly, start, goals).gaps(goals)).max() < 1e-9
+        assert np.abs(contact_equations(scenario.assembly, start, goals).gaps(goals)).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["vanished_fixture", "gearbox", "nested_bushings"])
@@ -176,7 +175,7 @@ def test_neither_simulator_nor_torch_is_loaded() -> None:
         ({"scenarios": "dovetial"}, "unknown scenario 'dovetial'"),
         ({"scenarios": "dovetail", "n": 0}, "0 pairs were asked for"),
         ({"scenarios": 5}, "a Path, a Scenario or a list"),
-        ({"scenarios": "dovetail", "noise_level": -1.0}, "noise_level"),
+        ({"scenarios": "dovetail", "noise_level": -1.0}, "noise level"),
     ],
 )
 def test_what_is_wrong_is_said(given: dict[str, object], complaint: str) -> None:

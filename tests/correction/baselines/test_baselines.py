@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Observation, correct
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import contact_equations
 from apo_bench.correction.baselines.intruding_boxes import intruding, meeting
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import loss
@@ -121,7 +121,7 @@ def test_depth_is_the_shortest_way_out() -> None:
     built = scenes.bridge()
     goals = built.goals.copy()
     goals[1, :3, 3] += (-2e-3, 1e-3, -0.5e-3)
-    system = equations(built.assembly, built.start, goals)
+    system = contact_equations(built.assembly, built.start, goals)
     found = intruding(meeting(built.assembly, system), goals)
     solids = built.assembly.solids
     T = dict(zip(("B", "C", "A"), goals, strict=True)) | {"table": built.start["table"]}

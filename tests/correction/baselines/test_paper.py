@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, InputError, Observation, correct
-from apo_bench.assembly import Step, Try, largest_gap
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Step, Try, contact_equations, largest_gap
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.solvers.newton import LENGTH_M, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
@@ -52,7 +51,7 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
-    system = equations(scene.assembly, scene.start, goals)
+    system = contact_equations(scene.assembly, scene.start, goals)
     return solve_newton(system.among(system.containing(freed)), goals, freed).gap_m * 1e3
 
 
@@ -120,7 +119,7 @@ def test_the_world_frame_does_not_matter() -> None:
 def drift(scene: scenes.Scene, seen: Array) -> float:
     """How far the solver moved what no contact fixes, over 2 mm; rotations as the way of a point 40 mm away."""
     n = len(seen)
-    system = equations(scene.assembly, scene.start, seen)
+    system = contact_equations(scene.assembly, scene.start, seen)
     found = solve_newton(system, seen, range(n))
     assert found.gap_m < NOTHING_M
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], n)

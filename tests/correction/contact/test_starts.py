@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from apo_bench import correct
-from apo_bench.assembly import faces_away, largest_gap
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import contact_equations, faces_away, largest_gap
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_poses
-from apo_bench.correction.solvers.newton_descent import descended
+from apo_bench.correction.solvers.newton_descent import descend_to_nearest
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown
@@ -55,11 +54,11 @@ def test_where_contacts_bend_newton_ends_where_small_steps_would():
     seen = turned("block_on_block", 1, [180, 0, 0])
     L = scales(seen.covariance)
     goals = correct(seen, "contact").poses
-    system = compact_equations(equations(seen.assembly, seen.start, goals), 2)
+    system = compact_equations(contact_equations(seen.assembly, seen.start, goals), 2)
     beside = goals.copy()
     beside[1] = beside[1] @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
     assert length(seen, beside) > length(seen, goals)
-    there = descended(system, seen.poses, L, beside)
+    there = descend_to_nearest(system, seen.poses, L, beside)
     assert length(seen, there) == pytest.approx(length(seen, goals), rel=1e-9)
     creeping = nearest_poses(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
     assert not creeping.at_rest

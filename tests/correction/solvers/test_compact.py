@@ -8,8 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Equations, placements
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Equations, contact_equations, placements
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
 from apo_bench.geometry import Array, pose
 from tests import scenes
@@ -21,7 +20,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 def both(scene: scenes.Scene) -> tuple[Equations, CompactEquations]:
-    system = equations(scene.assembly, scene.start, scene.goals)
+    system = contact_equations(scene.assembly, scene.start, scene.goals)
     return system, compact_equations(system, len(scene.goals))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from apo_bench import ContactCorrector, Observation, correct, correct_many, load_scenario
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import contact_equations
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
@@ -36,7 +36,7 @@ def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[CompactEquat
     twisted = np.tril(rng.normal(scale=0.2, size=(len(given.assembly), 6, 6)), -1) + np.eye(6)
     L = sigma[:, :, None] * twisted
     goals = given.goals @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
-    return compact_equations(equations(given.assembly, given.start, goals), len(goals)), goals, L
+    return compact_equations(contact_equations(given.assembly, given.start, goals), len(goals)), goals, L
 
 
 def alike(expected: NearestPoses, actual: NearestPoses, within_m: float) -> None:

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import contact_equations
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
 from apo_bench.correction.solvers.posterior import jacobian_rank
@@ -32,7 +32,7 @@ def crooked(n: int, rng: np.random.Generator, mm: float = 2.0, deg: float = 1.0)
 
 
 def system_of(scene: scenes.Scene, goals: Array) -> CompactEquations:
-    return compact_equations(equations(scene.assembly, scene.start, goals), len(goals))
+    return compact_equations(contact_equations(scene.assembly, scene.start, goals), len(goals))
 
 
 def twisted(goals: Array, L: Array, rng: np.random.Generator) -> Array:
@@ -68,7 +68,7 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
         found = nearest_poses(system, seen, L)
         assert found.at_rest
         assert found.finite
-        assert np.abs(equations(scene.assembly, scene.start, seen).residual(found.poses)).max() <= 1e-12
+        assert np.abs(contact_equations(scene.assembly, scene.start, seen).residual(found.poses)).max() <= 1e-12
         J = jacobian(system, found)
         assert jacobian_rank(J.T) == jacobian_rank(found.Jt) == RANKS[name]
         assert drift(J, found.z, RANKS[name]) <= 1e-6
@@ -100,7 +100,7 @@ def test_ever_stiffer_springs_lead_to_the_same() -> None:
     rng = np.random.default_rng(11)
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
-    plain = equations(scene.assembly, scene.start, seen)
+    plain = contact_equations(scene.assembly, scene.start, seen)
 
     def pulls(z: Array, soft_m: float) -> Array:
         return np.concatenate([z, plain.residual(seen @ pose.exp((L @ z.reshape(3, 6, 1))[..., 0])) / soft_m])

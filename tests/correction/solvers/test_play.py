@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Demonstration, correct_many, observe
-from apo_bench.assembly.equations import equations
-from apo_bench.assembly.pattern import pattern
+from apo_bench.assembly import contact_equations, contact_pattern
 from apo_bench.correction.checks.chi_square import fit_deviation
 from apo_bench.correction.contact.contact import contact_refuse
 from apo_bench.correction.solvers.play import fit_covariance, plays
@@ -49,7 +48,7 @@ def test_faces_that_look_opposite_ways_are_off_by_the_same():
     assembly = shown("carried_bridge")[0].assembly
     number = {str(r.contact): i for i, r in enumerate(assembly.relations())}
     S = fit_covariance(assembly, 1.0)[::3, ::3]
-    corners = np.diff(pattern(assembly).begin)
+    corners = np.diff(contact_pattern(assembly).begin)
     S = 3.0 * S / np.sqrt(np.outer(corners, corners))
     up = number["stick.pz on cube.hpz"]
     down = number["stick.nz on cube.hnz"]
@@ -65,7 +64,7 @@ def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     goals = np.array(layout.poses)
     goals[3, 2, 3] -= PLAY_M
     goals[4, 2, 3] -= 2.0 * PLAY_M
-    deep = equations(scenario.assembly, layout.start, goals).gaps(goals)
+    deep = contact_equations(scenario.assembly, layout.start, goals).gaps(goals)
     assert by_contact("carried_bridge", deep)["stick.nz on castle1.sfl"] == pytest.approx(3.0 * PLAY_M)
     human = Demonstration(scenario.assembly, layout.start, goals, layout.start, np.zeros((5, 6, 6)), play_m=PLAY_M)
     rng = np.random.default_rng(0)

@@ -15,7 +15,7 @@ from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_poses
-from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settled_basis
+from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settle_basis
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -115,6 +115,6 @@ def test_a_settled_basis_is_of_the_span_alone(free: int) -> None:
     for _ in range(5):
         N = np.linalg.qr(rng.standard_normal((30, free)))[0]
         turned = N @ np.linalg.qr(rng.standard_normal((free, free)))[0]
-        settled = settled_basis(N)
+        settled = settle_basis(N)
         assert_allclose(settled @ settled.T, N @ N.T, rtol=0, atol=1e-12)
-        assert_allclose(settled_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)
+        assert_allclose(settle_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)

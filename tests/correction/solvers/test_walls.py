@@ -9,8 +9,7 @@ import pytest
 from scipy.optimize import nnls
 
 from apo_bench import Assembly, Observation, correct
-from apo_bench.assembly import Contact, Gap
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Contact, Gap, contact_equations
 from apo_bench.geometry import Array, pose, right_jacobian
 from tests import scenes
 from tests.correction.solvers.test_manifold import correction, crooked, scales, twisted
@@ -45,7 +44,7 @@ def look(assembly: Assembly, scene: scenes.Scene, goals: Array, L: Array, play_m
 
 def beyond(seen: Observation, goals: Array) -> float:
     """How far the worst vertex is out of the interval that is asked, [m]."""
-    system = equations(seen.assembly, seen.start, seen.poses)
+    system = contact_equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e = system.residual(goals)
@@ -58,7 +57,7 @@ def unbalanced(seen: Observation, goals: Array) -> float:
     xi = pose.log(pose.inverse(seen.poses) @ goals)
     z = correction(seen.poses, goals, np.asarray(L, dtype=np.float64))
     B = right_jacobian(xi) @ L
-    system = equations(seen.assembly, seen.start, seen.poses)
+    system = contact_equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e, J = system.linearised(goals)

@@ -186,17 +186,3 @@ def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None
 
     assert made(1) == made(1)
     assert made(1) != made(2)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
-    human_error_scale = np.zeros((5, 6, 6))
-    human_error_scale[1, 1, 1] = 0.0029**2
-    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, human_error_scale))
-    plain, loose = (
-        observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0))
-        for demonstration in demonstrations
-    )
-    assert_array_equal(loose.poses, plain.poses)
-    assert plain.observed[1]
-    assert_allclose(loose.covariance - plain.covariance, human_error_scale, atol=1e-17)

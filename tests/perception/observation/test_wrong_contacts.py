@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, InputError, load_scenario
-from apo_bench.assembly import Contact, relation_graph
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly import Contact, contact_equations, relation_graph
 from apo_bench.perception.observation.wrong_contacts import (
     NEAR_FACES_M,
     TOUCHING_M,
@@ -33,7 +32,7 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 
 def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
     """The largest |e| of each contact at the truth, [m]."""
-    return equations(assembly, scene.start, scene.goals).gaps(scene.goals)
+    return contact_equations(assembly, scene.start, scene.goals).gaps(scene.goals)
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
@@ -74,7 +73,7 @@ def test_a_false_contact_is_plausible(name: str) -> None:
         before = {part for operation in s.assembly.operations[:made] for part in operation.moves}
         assert contact.manipulated.part in s.assembly.operations[made].moves
         assert contact.environment.part in s.assembly.fixed | before
-        system = equations(wrong, s.start, s.goals)
+        system = contact_equations(wrong, s.start, s.goals)
         apart = system.gaps(s.goals)[[r.contact == contact and r.made == made for r in wrong.relations()]]
         assert apart > TOUCHING_M
         if name in ("carried_bridge", "pocket_table"):

@@ -10,7 +10,8 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
-from apo_bench.planning.insertion.arrival import Arrival, Preference, arrive
+from apo_bench.planning.insertion.arrival import Arrival, arrive
+from apo_bench.planning.insertion.attach import Preference
 from apo_bench.planning.insertion.macros import Chain, Way, chain, departure, peel
 from tests import scenes
 

@@ -10,7 +10,9 @@ import pytest
 
 from apo_bench.assembly import placements
 from apo_bench.geometry import Array
-from apo_bench.planning.insertion.arrival import Arrival, OperationMacros, Preference, arrive, turning_state, understand
+from apo_bench.planning.insertion.arrival import Arrival, arrive, turning_state
+from apo_bench.planning.insertion.attach import Preference
+from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
 from apo_bench.planning.insertion.surroundings import slide_directions
 from tests import rounds
 from tests.brackets import under_roof

@@ -10,7 +10,7 @@ import pytest
 from apo_bench import Assembly, Plan
 from apo_bench.assembly import Step, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.planning.insertion.arrival import Attach
+from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.planning.prediction.measures import ArmMove
 from apo_bench.planning.prediction.resting import is_support, residual, resting_poses

@@ -1,4 +1,4 @@
-"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+"""Noise with gross outliers and missed operations."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
@@ -67,20 +67,20 @@ class Outliers:
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
-        goals = seen.poses.copy()
+        poses = seen.poses.copy()
         covariance = seen.covariance.copy()
-        goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
+        poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
-        return replace(seen, poses=goals, covariance=covariance, observed=~missed, outliers=stated)
+        return replace(seen, poses=poses, covariance=covariance, observed=~missed, outliers=stated)
 
 
-def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:
+def last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
     """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
     now = dict(start)
-    out = goals.copy()
+    out = poses.copy()
     for k, operation in enumerate(assembly.operations):
         if seen[k]:
-            now[operation.main] = goals[k]
+            now[operation.main] = poses[k]
         out[k] = now.get(operation.main, np.eye(4))
     return out

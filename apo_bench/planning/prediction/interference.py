@@ -1,0 +1,96 @@
+"""How deep a plan puts parts into one another: at the goal, on the way in, and where that way begins."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Operation, Poses
+from apo_bench.geometry import (
+    Array,
+    Solid,
+    ball_around,
+    intrusion_depths,
+    physical_pieces,
+    pose,
+    remembered,
+)
+from apo_bench.planning.insertion.attach import Attach
+
+_SPACING_M = 0.02
+"""Largest distance between two places on the way in that are examined, up to `_MOST` places."""
+_MOST = 8
+"""Places on the way in that are examined, at most."""
+_ABOVE_M = np.linspace(0.0, 0.04, 9)
+"""Heights above the begin of a level way in that are examined, (9,), since a part comes down there."""
+_LEVEL = 0.5
+"""A way in is level if its cosine with the vertical is smaller."""
+FAR_M = 0.01
+"""Parts that are further apart count as so far apart."""
+Solids = Mapping[str, Solid]
+
+
+@remembered
+def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
+    """The parts as they are made, fit faces receded; the same ones each time."""
+    made = {
+        name: replace(solid, pieces=physical_pieces(solid, clearance_mm * 1e-3))
+        for name, solid in assembly.solids.items()
+    }
+    return MappingProxyType(made)
+
+
+def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:
+    """How deep each part that moves comes into each one that rests and that it should not touch, [m].
+
+    Args:
+        planned: Every part where the plan has it after the operation.
+        how: The way in; without it the goal alone is looked at.
+
+    Returns:
+        Negative: how far off they stay.
+    """
+    touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
+    back = _way_back(planned[operation.main], how)
+    pairs = [pair for pair in _pairs(operation, physical) if frozenset(pair) not in touching]
+    return [_deepest(physical[a], planned[a], physical[b], planned[b], back) for a, b in pairs]
+
+
+def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:
+    """How deep each part comes into each one that rests while it comes down to where a level way in begins, [m].
+
+    Parts that it touches in the end count, too: there it has not come into them yet.
+
+    Returns:
+        As `depths_on_way`; `-FAR_M` of any other way in.
+    """
+    pairs = _pairs(operation, physical)
+    way = np.array([0.0, 0.0, 1.0]) if how is None else planned[operation.main][:3, :3] @ how.direction
+    if how is None or abs(way[2]) >= _LEVEL:
+        return [-FAR_M] * len(pairs)
+    down = _ABOVE_M[:, None] * np.array([0.0, 0.0, 1.0]) - how.travel_m * way
+    return [_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
+
+
+def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
+    return [(a, b) for a in operation.moves for b in physical if b not in operation.moves]
+
+
+def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float:
+    """The deepest intrusion over all displacements (k, 3) of a, [m]; far off ones are skipped."""
+    middle, radius = ball_around(a.pieces)
+    seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, middle[None]) + shifts)
+    near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
+    if not near.any():
+        return -FAR_M
+    depths = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b, FAR_M)
+    return max(-FAR_M, float(depths.max()))
+
+
+def _way_back(goal: Array, how: Attach | None) -> Array:
+    """From the goal back along the way in, (k, 3), world, [m]."""
+    if how is None:
+        return np.zeros((1, 3))
+    k = min(_MOST, 1 + int(np.ceil(how.travel_m / _SPACING_M)))
+    return -np.outer(np.linspace(0.0, how.travel_m, k), goal[:3, :3] @ how.direction)
