@@ -1,4 +1,4 @@
-"""The range finder: its pinhole views, where they stand, and what its sensor makes of true distances."""
+"""The range finder: pinhole views, and the errors of its sensor."""
 
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache

@@ -1,4 +1,4 @@
-"""Noise files, by path or by the name under which they come with the package: a measured estimator as TOML."""
+"""Noise files: a measured pose estimator as TOML."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The solids that generated parts are: blocks, boards, axles, rings, and prisms with slots and slopes; lengths in mm.
+"""Bodies of generated parts, lengths in mm.
 
 Holes and slots are marked fit and get wider by the clearance. What goes into them stays as it is drawn.
 """

@@ -1,4 +1,4 @@
-"""Families of assemblies: which stations stand on a board, and how many parts each has."""
+"""Families of generated assemblies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+"""Noise with gross outliers and missed operations."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final

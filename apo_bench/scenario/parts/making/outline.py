@@ -1,4 +1,4 @@
-"""Flat outlines of lines and arcs, [mm]: as rings of corners, and their exact moments."""
+"""Flat outlines of lines and arcs, [mm]."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Bodies of revolution: shafts with chamfers, discs and bushes with bores, cones."""
+"""Bodies of revolution."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
