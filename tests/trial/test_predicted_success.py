@@ -1,4 +1,4 @@
-"""A plan promises how likely it is to succeed, from what its planner knew; below `min_predicted_success` nothing moves."""
+"""Predicted success follows from what the planner knows; below `min_predicted_success` nothing moves."""
 
 from __future__ import annotations
 
