@@ -27,7 +27,7 @@ def assembly_import(
         ),
     ],
     *,
-    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder beside it.")],
+    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder next to it.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the files: mm, in, m, cm, ft or um; default: as they state.")
     ] = None,

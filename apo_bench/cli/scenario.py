@@ -78,7 +78,7 @@ def scenario_show(scenario: ScenarioArgument) -> None:
 def scenario_new(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="PART", help="Part files; default: as named in --poses, beside it."),
+        typer.Argument(metavar="PART", help="Part files; default: as named in --poses, next to it."),
     ] = None,
     *,
     poses: Annotated[Path, path_option("File of [[pose]]: the final pose of every part.")],

@@ -15,7 +15,7 @@ from apo_bench.importers.assembly.ordering import OrderSearch, Placing
 from apo_bench.importers.assembly.posed import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
 from apo_bench.importers.assembly.touching import close_contacts, find_clashes, find_contacts, walls_without_play
-from apo_bench.importers.cad.solids.naming import free_name
+from apo_bench.importers.cad.solids import free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site
 

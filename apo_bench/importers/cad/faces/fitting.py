@@ -7,8 +7,7 @@ from scipy.optimize import least_squares
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, square_to
 
 _MOST_POINTS = 400
 _TURNED = 0.09

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, square_to
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, square_to
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300

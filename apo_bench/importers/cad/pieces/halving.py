@@ -9,8 +9,7 @@ from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.pieces.refining import Beside, refine
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Region, mesh_of
 
 _MOST_CUTS = 400
 _TRIES = 6

@@ -15,7 +15,7 @@ from shapely import MultiPoint, Point
 
 from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
