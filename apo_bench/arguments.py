@@ -87,8 +87,8 @@ def _read(hint: Any) -> _Type:
         return _ANYTHING
     if issubclass(origin, tuple) and hasattr(origin, "_fields"):
         return _named_tuple(origin)
-    if issubclass(origin, Mapping) and within:
-        return _mapping(*map(_read, within))
+    if issubclass(origin, Mapping):
+        return _that("a mapping", lambda x: isinstance(x, Mapping))
     if issubclass(origin, Collection) and within:
         return _several(origin, within)
     return _that(add_article(origin.__name__), lambda x: isinstance(x, origin))
@@ -168,19 +168,6 @@ def _array(is_truth: bool) -> _Type:
         return array
 
     return _Type("an array of True and False" if is_truth else "an array of real numbers", take)
-
-
-def _mapping(name: _Type, entry: _Type) -> _Type:
-    """A mapping, which stays as it is."""
-
-    def take(value: Any) -> Any:
-        _require(isinstance(value, Mapping), value)
-        for key, each in value.items():
-            name.take(key)
-            entry.take(each)
-        return value
-
-    return _Type(f"a mapping from {name.words} to {entry.words}", take)
 
 
 def _several(origin: type, within: tuple[Any, ...]) -> _Type:

@@ -1,4 +1,4 @@
-"""The one error a person sees: what was given, what is allowed, what to do."""
+"""The one error that a user sees: cause, then remedy."""
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
@@ -7,9 +7,9 @@ from pathlib import PurePath
 from typing import Any
 
 _MOST = 24
-"""A longer list of names helps nobody."""
+"""Names in a list, at most."""
 _LONGEST = 200
-"""So much of a name that is not known is said again."""
+"""Letters of an unknown name that a message repeats."""
 
 
 RAISED = (Exception, SystemExit)
@@ -42,13 +42,13 @@ def one_line(text: str, longest: int) -> str:
 
 
 def failed(what: str, error: BaseException) -> InputError:
-    """`the noise model 'mine' failed: it raised RuntimeError('oops'); correct it, or use another.`, to raise from it."""
+    """`the noise model 'mine' failed: it raised RuntimeError('oops'); correct it, or use another.`, to raise."""
     try:
         text = " ".join(str(error).split()) if type(error) in (ValueError, ArgumentError) else ""
-        said = text.rstrip(".") or f"it raised {' '.join(repr(error).split())}"
+        reason = text.rstrip(".") or f"it raised {' '.join(repr(error).split())}"
     except Exception:
-        said = f"it raised {type(error).__name__}"
-    return InputError(f"{what} failed: {said}; correct it, or use another.")
+        reason = f"it raised {type(error).__name__}"
+    return InputError(f"{what} failed: {reason}; correct it, or use another.")
 
 
 def missing_package(what: str, package: str, instead: str = "") -> InputError:

@@ -1,9 +1,6 @@
-"""Everything a user may bring comes by short name, as `module:name`, or as the object itself."""
-
-from __future__ import annotations
+"""Resolve a short name, `module:name`, or the object itself."""
 
 import importlib
-import inspect
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -98,16 +95,9 @@ def _import_named(name: str) -> ModuleType:
 
 
 def _public(module: Any) -> list[str]:
-    """List what a module offers: neither modules nor functions and classes of other packages."""
-    package = module.__name__.partition(".")[0]
-    names = []
-    for name, value in vars(module).items():
-        made = inspect.isroutine(value) or inspect.isclass(value)
-        where = str(getattr(value, "__module__", package)) if made else package
-        own = not name.startswith("_") and not inspect.ismodule(value) and not isinstance(value, type(annotations))
-        if own and where.partition(".")[0] == package:
-            names.append(name)
-    return names
+    """List the functions and classes that a module defines."""
+    own = {name: value for name, value in vars(module).items() if not name.startswith("_")}
+    return [name for name, value in own.items() if getattr(value, "__module__", None) == module.__name__]
 
 
 def importable_name(function: Any) -> str | None:

@@ -1,7 +1,7 @@
 """Read data sets of `apo-bench dataset make` with other loaders: `python benchmarks/dataset_loaders.py`.
 
 The script writes replays and insertions in every format, and reads them in virtual environments: with LeRobot
-(`--python312`, as it needs Python 3.12; 5 GB of PyTorch), Minari and mlcroissant. Each result is compared with that of
+(`--python312`, as it needs Python 3.12; 5 GB of PyTorch), and Minari. Each result is compared with that of
 PyArrow or h5py. LeRobot also trains a small policy and evaluates it, as in the guide. `--envs FOLDER` keeps the virtual
 environments. Needs h5py: `pip install apo_bench[data]`.
 """
@@ -24,7 +24,7 @@ MADE = {
 }
 NEEDS = {
     "lerobot": ("lerobot[dataset,training]", str(ROOT)),
-    "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]"),
+    "minari": ("minari[hdf5]", "pillow"),
 }
 LEROBOT = """
 import sys
@@ -78,15 +78,6 @@ assert steps == data.total_steps and len(data.sample_episodes(2)) == 2
 right = data.filter_episodes(lambda episode: bool(episode.infos["success"][-1]))
 print(f"Minari {version('minari')}: {data.total_episodes} episodes, {steps} steps, {right.total_episodes} right, of",
       data.env_spec.id if data.env_spec else "no environment")
-"""
-CROISSANT = """
-import logging, sys
-from importlib.metadata import version
-import mlcroissant
-logging.disable(logging.WARNING)
-data = mlcroissant.Dataset(jsonld=f"{sys.argv[1]}/croissant.json")
-read = [f"{sum(1 for _ in data.records(each.id))} of {each.id}" for each in data.metadata.record_sets]
-print(f"mlcroissant {version('mlcroissant')}: {len(data.metadata.distribution)} files and sets;", *read)
 """
 
 
@@ -158,7 +149,6 @@ def main() -> None:
                         trains(lerobot, out)
                 if form == "minari":
                     reads(others, MINARI, out)
-                reads(others, CROISSANT, out)
 
 
 if __name__ == "__main__":

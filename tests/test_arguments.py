@@ -164,12 +164,6 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
             apo_bench.Demonstration(**{**parts, **shown, "start": observation.start, key: start})
 
 
-def test_an_array_of_a_wrong_shape_is_named() -> None:
-    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    with pytest.raises(apo_bench.InputError, match=r"^poses of Observation: an array of shape \(\d, 4, 4\) is needed"):
-        dataclasses.replace(observation, poses=observation.poses[:1])
-
-
 def test_a_noise_model_that_makes_a_wrong_record_is_named(castles: apo_bench.Scene) -> None:
     def mine(assembly: Any, shown: Any, rng: Any) -> Any:
         return apo_bench.Observation(assembly, shown.start, shown.poses, None, [True] * len(assembly))  # type: ignore[arg-type]

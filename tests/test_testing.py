@@ -55,14 +55,6 @@ def test_a_method_is_held_against_what_is_asked() -> None:
         assert_success_rate("oracle", EASY | {"robot_error": "hand_eye:20/5"}, at_least=0.99, margin=0.3, error=0.1)
 
 
-def test_a_corrector_itself_is_taken_and_what_is_no_trials_is_refused() -> None:
-    from apo_bench.correction.contact.contact import contact
-
-    assert assert_success_rate(contact, EASY, at_least=0.95, margin=0.6, error=0.1).passed
-    with pytest.raises(InputError, match="give a track"):
-        assert_success_rate("contact", 3, at_least=0.9, margin=0.1)  # type: ignore[arg-type]
-
-
 def test_no_trial_decides_nothing() -> None:
     with pytest.raises(InputError, match="whole number from 1"):
         sequential_test(iter([True]), 0.9, 0.1, most=0)
@@ -73,10 +65,10 @@ def test_no_trial_decides_nothing() -> None:
 @pytest.mark.parametrize(
     ("method", "cell", "said"),
     [
-        (None, EASY, "give a name or a corrector"),
-        ("uncorrected", {}, "name one"),
+        (None, EASY, "method of assert_success_rate must be"),
+        ("uncorrected", {}, "need a scenario"),
         ("uncorrected", EASY | {"bogus": 1}, "unknown setting 'bogus'"),
-        ("uncorrected", EASY | {"seed": 1}, "unknown setting 'seed'"),
+        ("uncorrected", EASY | {"seed": 1}, "and no seed"),
     ],
 )
 def test_wrong_requests_are_refused(method: object, cell: object, said: str) -> None:

@@ -37,7 +37,7 @@ def arm_check(
     name: Annotated[
         str, typer.Argument(metavar="ARM", help="A name from `arm list`, FILE.toml, menagerie:NAME or robosuite:NAME.")
     ],
-    scenario: Annotated[str, typer.Argument(metavar="[SCENARIO]", help="Scenario by name or file.")] = "stick_in_tower",
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario by name or file.")] = "stick_in_tower",
     layouts: Annotated[int, typer.Option(min=1, max=1000, help="Number of layouts to check.")] = 20,
     out: Annotated[Path | None, path_option("Draw the arm at the table into this file: .png.")] = None,
 ) -> None:

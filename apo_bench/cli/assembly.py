@@ -23,18 +23,18 @@ def assembly_import(
     files: Annotated[
         list[Path],
         typer.Argument(
-            parser=parse_path, metavar="FILE...", help="A CAD file of several solids, or several files in one frame."
+            parser=parse_path, metavar="FILE", help="A CAD file of several solids, or several files in one frame."
         ),
     ],
     *,
-    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder beside it.")],
+    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder next to it.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the files: mm, in, m, cm, ft or um; default: as they state.")
     ] = None,
     up: Up = None,
     fixed: Fixed = None,
     order: Order = None,
-    clearance_mm: ClearanceMm = None,
+    clearance_mm: ClearanceMm = 0.25,
     max_overlap_mm: MaxOverlapMm = 0.2,
     overwrite: Overwrite = False,
 ) -> None:

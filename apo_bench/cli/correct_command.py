@@ -20,27 +20,16 @@ from apo_bench.cli.shared import (
     print_table,
     say,
 )
-from apo_bench.errors import require, require_known
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, with_simulated
 
 _EXACT_M = 1e-9  # contacts that hold this well are a solution, at which a rank can be computed
-_DOUBTS = ("apply", "warn", "refuse", "drop")
 
 
 def correct_command(
     scenario: ScenarioArgument,
     observation: Annotated[Path, path_option("Observed poses: .csv, or .json of `run --save-observation`.")],
-    method: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Corrector by name, or package.module:name; default: {CORRECTOR}, or contact with --if-doubtful."
-        ),
-    ] = None,
-    if_doubtful: Annotated[
-        str | None,
-        typer.Option(help="What the corrector contact does if its test fails: apply, warn, refuse or drop."),
-    ] = None,
+    method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     camera_noise: Annotated[
@@ -53,7 +42,7 @@ def correct_command(
 
     Examples:
       apo-bench correct stick_in_tower --observation docs/seen.csv
-      apo-bench correct stick_in_tower --observation docs/seen.csv --if-doubtful drop --out plan.json
+      apo-bench correct stick_in_tower --observation docs/seen.csv --method contact-drop --out plan.json
     """
     from apo_bench import correct
     from apo_bench.formats.deviations import assumed_deviations
@@ -63,8 +52,6 @@ def correct_command(
     from apo_bench.viz.form_text import form_table
 
     check_output(out, "--out", ".json", ".csv", inputs=(observation,))
-    method = method or (CORRECTOR if if_doubtful is None else "contact")
-    corrector = _find_corrector(method, if_doubtful)
     observed, task, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
@@ -75,7 +62,7 @@ def correct_command(
         observed = restate(observed, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
-        correction = correct(observed, corrector)
+        correction = correct(observed, with_simulated(method))
     explanation = _explain_solution(observed, correction)
     form = correction_form(task.name, method, observed, correction, explanation, assumed)
     lines = correction_lines(form, correction)
@@ -113,15 +100,6 @@ def _explain_solution(observation: Observation, correction: Correction) -> Any:
         return None
     exact = gap_of(observation, correction.poses, correction.dropped) <= _EXACT_M
     return explain(observation, correction) if exact else None
-
-
-def _find_corrector(method: str, doubt: str | None) -> Any:
-    from apo_bench import ContactCorrector
-
-    if doubt is not None:
-        require_known("value of --if-doubtful", doubt, _DOUBTS)
-        require(method == "contact", f"--if-doubtful needs --method contact, got {method}.")
-    return ContactCorrector(doubt or "warn") if method == "contact" else with_simulated(method)  # type: ignore[arg-type]
 
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:

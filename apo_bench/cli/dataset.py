@@ -27,7 +27,7 @@ commands = group("dataset", _HELP)
 @takes(trial_options("noise_level", "human_error_scale", "noise", "method", "clearance_mm", "robot_error", "arm"))
 def dataset_make(
     scenario: ScenarioArgument,
-    more: Annotated[list[str] | None, typer.Argument(metavar="[SCENARIO]...", help="More scenarios.")] = None,
+    more: Annotated[list[str] | None, typer.Argument(metavar="SCENARIO", help="More scenarios.")] = None,
     *,
     out: Annotated[Path, path_option("Folder of the data set; it must not exist.")],
     episodes: Annotated[int, typer.Option(min=1, help="Trials of each scenario.")] = 10,

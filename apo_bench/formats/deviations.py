@@ -1,4 +1,4 @@
-"""Which standard deviations an observation may state, and which are assumed where it states none."""
+"""Standard deviations that an observation may state, and those that are assumed."""
 
 from math import pi
 
@@ -12,7 +12,7 @@ DEVIATION_DEG = 1.0
 """What is assumed where a file states no standard deviations."""
 SHIFT_M = (1e-7, 10.0)
 TURN_RAD = (1e-4 * pi / 180.0, pi)
-"""Least and greatest standard deviation, [m] and [rad]: within, ranks and gaps are told from rounding."""
+"""Least and greatest standard deviation, [m] and [rad]: within these, rounding hides neither ranks nor gaps."""
 _ROUNDING = 1e-9
 
 
@@ -32,7 +32,7 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
 
 
 def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
-    """What is said where a file states no standard deviations; None stands for the default."""
+    """Return the note on a file that states no standard deviations; None stands for the default."""
     mm = DEVIATION_MM if deviation_mm is None else deviation_mm
     deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
     return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"

@@ -50,29 +50,25 @@ def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
 
     By less than nothing they come forward.
     """
+    from scipy.spatial import ConvexHull
+
     if all_boxes(solid.pieces):
-        return tuple(_receded(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
+        return tuple(_recede_box(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
     hulls = [p if isinstance(p, Hull) else Hull(p.name, p.corners) for p in solid.pieces]
     kept = list[Piece]()
     gone_m3 = 0.0
     for hull in hulls:
         try:
-            kept.append(receded_hull(solid, hull, clearance_m))
+            kept.append(_recede_hull(solid, hull, clearance_m))
         except InputError:
             # What lies behind a fit face and is thinner than the clearance goes with it, if it is hardly anything.
-            gone_m3 += _volume(hull)
+            gone_m3 += float(ConvexHull(hull.corners).volume)
             if gone_m3 > _CRUMBS * solid.volume:
                 raise
     return tuple(kept)
 
 
-def _volume(hull: Hull) -> float:
-    from scipy.spatial import ConvexHull
-
-    return float(ConvexHull(hull.corners).volume)
-
-
-def _receded(solid: Solid, box: Box, clearance_m: float) -> Box:
+def _recede_box(solid: Solid, box: Box, clearance_m: float) -> Box:
     # Each side that carries a fit face moves inwards: a half size loses half of what both sides lose, the centre goes
     # away from the side that loses more.
     high, low = clearance_m * np.array([_carries_fit(solid, box, side) for side in box.planes]).reshape(2, 3)
@@ -98,14 +94,14 @@ def _carries_fit(solid: Solid, box: Box, side: Array) -> bool:
     return bool(fit)
 
 
-def receded_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
+def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     """A piece whose sides on fit faces moved inwards: a hole gets wider, a shaft thinner, both by the clearance.
 
     Raises:
         InputError: Nothing is left of the piece.
     """
     if hull.cylinder is not None:
-        return _thinner(solid, hull, clearance_m)
+        return _recede_cylinder(solid, hull, clearance_m)
     on = [i for i, side in enumerate(hull.planes) if _on_fit(solid, hull, side)]
     if not on:
         return hull
@@ -122,7 +118,7 @@ def receded_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     return Hull(hull.name, _each_once(corners))
 
 
-def _thinner(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
+def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     """A cylinder whose wall, or whose ends, recede."""
     assert hull.cylinder is not None
     center, axis, radius, half = hull.cylinder

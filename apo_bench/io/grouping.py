@@ -1,4 +1,4 @@
-"""Put together what has the same key."""
+"""Group values by their keys."""
 
 from collections.abc import Hashable, Iterable
 from typing import TypeVar
@@ -8,7 +8,7 @@ V = TypeVar("V")
 
 
 def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Key -> all that came with it; keys and what came with them in the order in which they came."""
+    """Group values by their keys; both keep the order in which they came."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)

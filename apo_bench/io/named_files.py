@@ -1,4 +1,4 @@
-"""The files that an MJCF file is made of: itself, what it includes, and the meshes and pictures that it names."""
+"""The files that an MJCF file is made of."""
 
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
@@ -41,7 +41,7 @@ def named_files(mjcf: Path) -> tuple[Path, ...]:
 
 
 def _elements(model: Path) -> Iterable[ElementTree.Element]:
-    """All elements of a file; none of one that cannot be read, which is said where it is used."""
+    """All elements of a file; none of one that cannot be read, which its reader refuses."""
     try:
         return ElementTree.fromstring(read_bytes(model, "MJCF file", _LARGEST_BYTES)).iter()
     except (ElementTree.ParseError, InputError, ValueError):

@@ -1,4 +1,4 @@
-"""What processes that are started find in their environment."""
+"""The environment of processes that are started."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -10,7 +10,7 @@ SAFE_PATH = "PYTHONSAFEPATH"
 
 @contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """What processes that are started meanwhile find in their environment besides."""
+    """Add variables to the environment of processes that are started meanwhile."""
     before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:

@@ -1,4 +1,4 @@
-"""The operations of a scenario at its nominal goals, with the line on which each part comes there."""
+"""Lines on which parts come to their nominal poses."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
         if through is not None and through.normal @ way > _THROUGH:
             face = next(of for of in through.contact if of.part == through.rests)
             raise InputError(
-                f"{key}, along: '{main}' would come through '{face}', which it shall touch; "
+                f"{key}, along: '{main}' would come through '{face}', which it has to touch; "
                 f"give a direction that leads onto that face or along it, or leave 'along' out."
             )
     if stated.travel_m is not None and after.chain.way is not None:

@@ -1,4 +1,4 @@
-"""Whether the numbers of a scenario fit its topology: contacts closed, parts apart, wherever the truth may vary to."""
+"""Checks that the numbers of a scenario fit its topology, wherever the truth may vary to."""
 
 from collections.abc import Iterator
 from itertools import combinations, product
@@ -15,9 +15,9 @@ from apo_bench.scenario.play import without_play
 from apo_bench.scenario.scenario import Scenario
 
 _GAP_M = 1e-6
-"""Faces that are said to touch are nearer than this."""
+"""Faces of a contact are nearer than this."""
 _ANGLE_DEG = 0.01
-"""Normals of faces that are said to touch are opposite within this, and axes parallel."""
+"""Normals of faces of a contact are opposite within this, and axes parallel."""
 DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch: pieces of an import may be so deep."""
 

@@ -1,4 +1,4 @@
-"""The contacts of an operation in a scenario file: faces on faces, and how far apart they are asked to be.
+"""The contacts of an operation in a scenario file, and the gaps between their faces.
 
 A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a table that says more:
 
@@ -18,7 +18,7 @@ from apo_bench.geometry import Face, RoundFace, Solid
 from apo_bench.scenario.tables import ContactTable
 
 ContactGaps = Mapping[Contact, Gap]
-"""What is asked of each contact, in the order of the file."""
+"""The gap of each contact, in the order of the file."""
 
 
 def read_contacts(
@@ -52,13 +52,13 @@ def read_contacts(
 
 
 def check_kinds(place: str, gaps: Sequence[ContactGaps]) -> None:
-    """A contact that the last of some operations makes again is asked for in the same way as before."""
+    """Check that a contact that the last of some operations makes again has the same gap as before."""
     for contact, gap in gaps[-1].items():
         for k, earlier in enumerate(gaps[:-1], start=1):
             wanted = earlier.get(contact, gap)
             require(
                 wanted == gap,
-                f"{place}, contacts: '{contact}' is asked to be {gap} here and {wanted} in operation {k}; ask for the "
+                f"{place}, contacts: '{contact}' is to be {gap} here and {wanted} in operation {k}; state the "
                 "same in both.",
             )
 
@@ -100,7 +100,7 @@ def _described(face: Face | RoundFace) -> str:
 
 
 def _gap(table: ContactTable, place: str, contact: Contact, solids: Mapping[str, Solid]) -> Gap:
-    """How far apart the faces are asked to be."""
+    """Return how far apart the faces may be."""
     a, b = (solids[of.part].face(of.face) for of in contact)
     if table.gap_mm is None:
         has_play = a.fit or b.fit or geometric_play(a, b) > 0.0

@@ -1,4 +1,4 @@
-"""How a human's error spreads: what is put against a displaced part is displaced alike, until someone sees it."""
+"""The spread of a human error to parts that are put against a displaced one."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ _Displaced = dict[str, Array]
 
 
 class ErrorSpread(NamedTuple):
-    """The error that each operation inherits from a careless one."""
+    """The error that each operation inherits from a wrong one."""
 
     offsets: Array
     """(n, 3): how far each operation puts its main part from its goal, in the frame of that part, [m]."""
@@ -28,14 +28,14 @@ class ErrorSpread(NamedTuple):
 
 
 def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpread:
-    """Follow an error of the careless operation through the demonstration.
+    """Follow the human error through the demonstration.
 
     A later part whose contact with a displaced one has a normal along the displacement goes along with it, by that
     component: it is guided by the face. Where no contact says otherwise a part goes to its true place. The last
     operation shows what is wrong, so it follows nothing.
 
     Args:
-        offset: (3,), [m], in the frame of the main part of the careless operation.
+        offset: (3,), [m], in the frame of the main part of the wrong operation.
     """
     assembly = scenario.assembly
     offsets = np.zeros((len(assembly), 3))
@@ -65,16 +65,16 @@ def human_error_covariance(scenario: Scenario, human_error_scale: float) -> Arra
 
 
 def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
-    """How far the faces of displaced parts lead a part astray, (3,), world, [m]."""
-    led = np.zeros(3)
+    """Return how far the faces of displaced parts guide a part off its place, (3,), world, [m]."""
+    shift = np.zeros(3)
     touched = touched_contacts(assembly, operation.contacts, operation.moves, poses)
     guides = [each for each in touched if each.rests in displaced]
     for _ in range(_SWEEPS):
         for each in guides:
-            led += each.normal * (each.normal @ (displaced[each.rests] - led))
-        if all(abs(each.normal @ (displaced[each.rests] - led)) < _AGREED_M for each in guides):
+            shift += each.normal * (each.normal @ (displaced[each.rests] - shift))
+        if all(abs(each.normal @ (displaced[each.rests] - shift)) < _AGREED_M for each in guides):
             break
-    return led
+    return shift
 
 
 def _displaced(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:

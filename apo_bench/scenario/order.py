@@ -1,6 +1,4 @@
-"""Whether parts start on something, and the operations of a scenario follow from each other: what is carried hangs
-together, nothing goes twice, nothing is left in the air.
-"""
+"""Checks that operations follow from each other."""
 
 import numpy as np
 
@@ -65,7 +63,7 @@ def _ends(contact: Contact) -> set[str]:
 
 
 AIR_M = 1e-4
-"""Lower above what is below it, a part settles within the first steps and is where it was said to be."""
+"""Lower above what is below it, a part settles within the first steps, at its start."""
 
 
 def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:

@@ -1,4 +1,4 @@
-"""Whether shafts have play in their holes: by their sizes, or by the clearance."""
+"""Checks that shafts have play in their holes."""
 
 from apo_bench.assembly import Assembly, contact_kind, geometric_play, play_mm
 from apo_bench.errors import require
@@ -20,7 +20,7 @@ def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
 
 
 def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
-    """Check a clearance that is asked for in place of the scenario's.
+    """Check a clearance that replaces the scenario's.
 
     Raises:
         InputError: It leaves a shaft no play in its hole.

@@ -142,29 +142,28 @@ def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str],
 
 
 @pytest.mark.parametrize(
-    ("doubt", "code", "status"),
-    [("apply", 0, "converged"), ("refuse", 1, "doubtful"), ("drop", 0, "converged")],
+    ("method", "code", "status"),
+    [("contact", 0, "converged"), ("contact-refuse", 1, "doubtful"), ("contact-drop", 0, "converged")],
 )
 def test_what_happens_in_doubt(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, doubt: str, code: int, status: str
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, method: str, code: int, status: str
 ) -> None:
     """Castle 2 was seen 25 mm aside: R4, which it has with the stick, is what the rest does without."""
     path = aside(tmp_path, 25.0)
     out = tmp_path / "out.csv"
-    ended, said, err = run(capsys, *asked(path, "--if-doubtful", doubt, "--json", "--out", str(out)))
+    ended, said, err = run(capsys, *asked(path, "--method", method, "--json", "--out", str(out)))
     made = json.loads(said)
     assert (ended, made["status"], made["test"]["passes"]) == (code, status, False)
-    assert made["dropped"] == (["R4"] if doubt == "drop" else [])
-    assert (made["test_after"] or {}).get("passes") == (True if doubt == "drop" else None)
-    assert made["test"]["ambiguous"] == ([] if doubt == "apply" else ["R4"])
+    assert made["dropped"] == (["R4"] if method == "contact-drop" else [])
+    assert (made["test_after"] or {}).get("passes") == (True if method == "contact-drop" else None)
+    assert made["test"]["ambiguous"] == ["R4"]
     assert out.exists() == (code == 0)
     assert err == ""
-    if doubt == "drop":
+    if method == "contact-drop":
         assert (made["rank"], made["freedom"], made["explanation"]["rank"]) == (11, 7, 11)
     if code:
         assert made["operations"] is None
-    words = run(capsys, *asked(path, "--if-doubtful", doubt))[1]
-    assert ("R4 may be wrong" in words) == (doubt != "apply")
+    assert "R4 may be wrong" in run(capsys, *asked(path, "--method", method))[1]
 
 
 def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -189,8 +188,7 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--if-doubtful", "maybe"), "Known: apply, drop, refuse, warn"),
-        (("--if-doubtful", "drop", "--method", "paper"), "--if-doubtful needs --method contact"),
+        (("--method", "papr"), "did you mean 'paper'"),
         (("--deviation-mm", "0"), "deviation_mm 0 was given; a number from 0.0001 to 10000 is allowed"),
     ],
 )

@@ -115,20 +115,6 @@ def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
     assert match_residuals(estimates, truth).surplus == 1
 
 
-def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
-    """Of what is there, and of what is not in its image; not those of images that nobody gave the truth of."""
-    where = made.where
-    R = made.R
-    t = made.t
-    more = np.concatenate([where, where[:2], np.add(where[:3], [0, 0, 50]), np.add(where[:4], [0, 1000, 0])])
-    rows = np.concatenate([np.arange(len(where)), np.arange(2), np.arange(3), np.arange(4)])
-    seen = read_results(
-        made_of.results(tmp_path / "e.csv", more, R[rows], t[rows] + 1e-3 * np.arange(len(rows))[:, None])
-    )
-    found = match_residuals(seen, read_results(made_of.results(tmp_path / "t.csv", where, R, t)))
-    assert (found.surplus, found.absent) == (5, 3)
-
-
 def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:
     """Published truth is rounded and scaled; angles do not suffer from that, those of the trace do."""
     R = Rotation.from_euler("xyz", [[30, 20, 10]], degrees=True).as_matrix()

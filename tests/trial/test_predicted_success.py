@@ -111,7 +111,7 @@ def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
         assert planned.plan is not None
         return predict_success(planned.plan, seen, planned.correction, scene, error, True, True)
 
-    right = predicted_success("uncorrected")
+    right = predicted_success("none")
     assert predicted_success("hand_eye:1/0.2+tool:0.5") == right
     assert predicted_success("in_hand:0/20") < right
 

@@ -1,4 +1,4 @@
-"""Wall times of trials, and what the workers of a sweep did, from `timing.jsonl`."""
+"""Wall times of trials and workers, from `timing.jsonl`."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -34,28 +34,34 @@ def trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
     made = []
     for scenario, method in sorted(times, key=lambda key: (key[0], rank(key[1]), key[1])):
         seconds = np.array(times[scenario, method], dtype=float)
-        names = ("trial_5_s", "trial_median_s", "trial_95_s")
-        percentiles = dict(zip(names, np.percentile(seconds, (5, 50, 95)).tolist(), strict=True))
-        counted = {"scenario": scenario, "method": method, "trials": len(seconds)}
-        made.append(counted | percentiles | {"trial_sum_s": float(seconds.sum())})
+        low, middle, high = np.percentile(seconds, (5, 50, 95)).tolist()
+        made.append(
+            {
+                "scenario": scenario,
+                "method": method,
+                "trials": len(seconds),
+                "trial_5_s": low,
+                "trial_median_s": middle,
+                "trial_95_s": high,
+                "trial_sum_s": float(seconds.sum()),
+            }
+        )
     return made
 
 
 def work(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
-    """One line per host and worker, with the rate over the time in which it was busy."""
-    busy = grouped((_worker(line), sum(line.get(part) or 0.0 for part in _PARTS)) for line in lines)
+    """One line per host and worker, with the rate over its busy time."""
+    workers = grouped(
+        ((str(line.get("host")), str(line.get("worker"))), sum(line.get(part) or 0.0 for part in _PARTS))
+        for line in lines
+    )
     return [
         {
             "host": host,
             "worker": worker,
-            "trials": len(seconds),
-            "busy_s": sum(seconds),
-            "rows_per_minute": 60.0 * len(seconds) / sum(seconds) if sum(seconds) > 0 else 0.0,
+            "trials": len(busy),
+            "busy_s": sum(busy),
+            "rows_per_minute": 60.0 * len(busy) / sum(busy) if sum(busy) > 0 else 0.0,
         }
-        for (host, worker), seconds in sorted(busy.items())
+        for (host, worker), busy in sorted(workers.items())
     ]
-
-
-def _worker(line: Mapping[str, Any]) -> tuple[str, str]:
-    host, worker = ("" if line.get(key) is None else str(line[key]) for key in ("host", "worker"))
-    return host, worker

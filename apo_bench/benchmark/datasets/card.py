@@ -1,10 +1,5 @@
-"""The card of a data set, for people and for programs: every field with its unit and frame, the licence, every file.
+"""The card of a data set, `README.md`, and what it describes: fields, episodes, metadata."""
 
-One episode as learners take it, and what is known of all of a data set.
-"""
-
-import hashlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +28,7 @@ class Field(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Rollout:
+class Episode:
     """One episode of T actions."""
 
     seed: int
@@ -52,7 +47,7 @@ class Rollout:
 
 @final
 @dataclass(frozen=True, eq=False)
-class About:
+class DatasetMetadata:
     """What is known of all episodes."""
 
     name: str
@@ -71,19 +66,12 @@ class About:
 
 
 LICENCE = "Apache-2.0"
-_TYPES = {".parquet": "application/x-parquet", ".json": "application/json", ".hdf5": "application/x-hdf5"}
-_CROISSANT = "http://mlcommons.org/croissant/"
-_WORDS = (
-    *("citeAs", "column", "equivalentProperty", "extract", "field", "fileObject", "fileProperty", "fileSet", "format"),
-    *("includes", "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet", "references", "regex"),
-    *("repeated", "replace", "samplingRate", "separator", "source", "subField", "transform"),
-)
-"""What Croissant 1.0 adds to schema.org, as far as its readers ask for it."""
-_DATA_TYPES = {"string": "sc:Text", "bool": "sc:Boolean", "int": "sc:Integer"}
 
 
-def noise_sheet(about: About, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]) -> None:
-    """Write `README.md`, and the same for programs: `croissant.json` (Croissant 1.0), with the hash of every file.
+def write_card(
+    about: DatasetMetadata, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]
+) -> None:
+    """Write the dataset card `README.md`: every field with its unit and frame, the licence, the command.
 
     Args:
         counted: How many episodes there are, and how many of them are right.
@@ -105,88 +93,10 @@ def noise_sheet(about: About, out: Path, counted: tuple[int, int], tables: Mappi
         lines += [f"| `{name}` | {' | '.join(_cells(column))} |" for name, column in columns.items()]
         several = {name: c.names for name, c in columns.items() if isinstance(c, Field) and len(c.names) > 1}
         lines += ["", *(f"Numbers of `{name}`: {', '.join(names)}." for name, names in several.items())]
-    files = sorted(path for path in out.rglob("*") if path.suffix in _TYPES)
     write_file(out / "README.md", "\n".join(lines) + "\n")
-    croissant = _croissant(about, out, files, f"{summary}. {about.summary}", tables)
-    write_file(out / "croissant.json", json.dumps(croissant, indent=1))
 
 
 def _cells(column: Field | str) -> tuple[str, ...]:
     if isinstance(column, str):
         return ("", "", "", column)
     return (str(len(column.names) or ""), column.unit, column.frame, column.meaning)
-
-
-def _croissant(about: About, out: Path, files: list[Path], summary: str, tables: Mapping[str, Any]) -> dict[str, Any]:
-    """The same as JSON-LD; columns of Parquet files are named one by one."""
-    distribution = [
-        {
-            "@type": "cr:FileObject",
-            "@id": path.relative_to(out).as_posix(),
-            "name": path.relative_to(out).as_posix(),
-            "contentUrl": path.relative_to(out).as_posix(),
-            "encodingFormat": _TYPES[path.suffix],
-            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        }
-        for path in files
-    ]
-    records = []
-    for pattern, columns in tables.items():
-        first = min(out.glob(pattern), default=None)
-        if first is None:
-            continue
-        name = pattern.removesuffix(".parquet").rstrip("/*")
-        from pyarrow import parquet
-
-        schema = parquet.read_schema(first)
-        distribution.append(
-            {
-                "@type": "cr:FileSet",
-                "@id": name,
-                "name": name,
-                "encodingFormat": _TYPES[".parquet"],
-                "includes": pattern,
-            }
-        )
-        fields = [
-            {
-                "@type": "cr:Field",
-                "@id": f"{name}/{column}",
-                "name": column,
-                "description": "; ".join(filter(None, _cells(each)[1:])),
-                "dataType": _data_type(schema.field(column).type),
-                "repeated": hasattr(schema.field(column).type, "value_type"),
-                "source": {"fileSet": {"@id": name}, "extract": {"column": column}},
-            }
-            for column, each in columns.items()
-        ]
-        records.append({"@type": "cr:RecordSet", "@id": f"records/{name}", "name": name, "field": fields})
-    return {
-        "@context": {
-            "@language": "en",
-            "@vocab": "https://schema.org/",
-            "sc": "https://schema.org/",
-            "cr": _CROISSANT,
-            "rai": f"{_CROISSANT}RAI/",
-            "dct": "http://purl.org/dc/terms/",
-            "conformsTo": "dct:conformsTo",
-            "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-            **{name: {"@id": f"cr:{name}", "@type": "@json"} for name in ("data", "examples")},
-            **{name: f"cr:{name}" for name in _WORDS},
-        },
-        "@type": "sc:Dataset",
-        "conformsTo": f"{_CROISSANT}1.0",
-        "name": f"apo_bench_{about.name}",
-        "description": summary,
-        "license": f"https://spdx.org/licenses/{LICENCE}",
-        "creator": {"@type": "sc:Organization", "name": "The apo_bench authors"},
-        "version": __version__,
-        "distribution": distribution,
-        "recordSet": records,
-    }
-
-
-def _data_type(kind: Any) -> str:
-    """What schema.org calls a type of Arrow, of a list its entries."""
-    name = str(getattr(kind, "value_type", kind))
-    return next((told for begins, told in _DATA_TYPES.items() if name.startswith(begins)), "sc:Float")

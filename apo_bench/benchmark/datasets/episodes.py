@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, noise_sheet
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Episode, Field, write_card
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
@@ -178,7 +178,7 @@ def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Itera
         yield Replay(scene, _episode(settings, scene, simulated, row, recorder), recorder.frames())
 
 
-def write_parquet(found: Iterable[Replay], about: About, out: Path) -> tuple[int, int]:
+def write_parquet(found: Iterable[Replay], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write replays as Parquet tables, and the card.
 
     Returns:
@@ -198,11 +198,11 @@ def write_parquet(found: Iterable[Replay], about: About, out: Path) -> tuple[int
     columns = [[each[name] for each in episodes] for name in EPISODES]
     write_columns([*EPISODES], columns, out / "episodes.parquet", KINDS)
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
-    noise_sheet(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
+    write_card(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
     return counted
 
 
-def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
+def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMetadata:
     """What is known of replays in these scenes, all of one arm."""
     arm = found[0].arm
     model = found[0].work.model
@@ -210,7 +210,7 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
     names = tuple(f"part{k}_{axis}" for k in slots for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
     joints = Field((*arm.joints, *arm.fingers), "rad or m", "", "positions of the arm's joints, and of the fingers")
     commands = tuple(model.actuator(k).name.removeprefix("arm/") for k in range(model.nu))
-    return About(
+    return DatasetMetadata(
         name="replays",
         summary="A human assembles parts, a camera sees with an error where each was put, a method plans, a robot arm "
         "replays, and a judge looks at physics alone. `apo-bench run` runs the trial of a seed again. Numbers of a "
@@ -235,7 +235,7 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> About:
     )
 
 
-def replay_rollouts(found: Iterable[Replay], about: About, say: Callable[[str], None]) -> Iterator[Rollout]:
+def replay_rollouts(found: Iterable[Replay], about: DatasetMetadata, say: Callable[[str], None]) -> Iterator[Episode]:
     """Replays as episodes, but for those of which nothing was carried out."""
     width = len(about.fields["environment_state"].names)
     for scene, episode, frames in found:
@@ -249,7 +249,7 @@ def replay_rollouts(found: Iterable[Replay], about: About, say: Callable[[str], 
         ]
         rewards = np.zeros(n)
         rewards[-1] = float(episode["success"])
-        yield Rollout(
+        yield Episode(
             seed=episode["seed"],
             task=f"{scene.scenario.title}: repeat what was shown.",
             observations={

@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from apo_bench.benchmark.datasets.card import FPS, About, Field, Rollout, noise_sheet
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Episode, Field, write_card
 from apo_bench.benchmark.datasets.episodes import KINDS
 from apo_bench.geometry import Array
 from apo_bench.io import replace_file, write_columns, write_file
@@ -55,7 +55,7 @@ _OF_EPISODE = {
 }
 
 
-def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
+def write_lerobot(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write episodes, and the card; a frame is what was seen before an action, and the action.
 
     Returns:
@@ -101,11 +101,11 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
     of_episodes = {**_OF_EPISODE, **about.episodes}
-    noise_sheet(about, out, counted, {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes})
+    write_card(about, out, counted, {"data/*/*.parquet": of_frames, "meta/episodes/*/*.parquet": of_episodes})
     return counted
 
 
-def _columns(rollout: Rollout, episode: int, before: int, task: int) -> dict[str, Array]:
+def _columns(rollout: Episode, episode: int, before: int, task: int) -> dict[str, Array]:
     """The columns of one episode, (T,) or (T, k)."""
     n = len(rollout.actions)
     last = np.arange(n) == n - 1
@@ -139,7 +139,7 @@ def _statistics(column: Array) -> dict[str, list[float]]:
 
 def _write_meta(
     out: Path,
-    about: About,
+    about: DatasetMetadata,
     fields: Mapping[str, Field],
     schema: Any,
     tasks: Mapping[str, int],

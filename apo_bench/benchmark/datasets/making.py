@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.datasets.card import About, Field, Rollout
+from apo_bench.benchmark.datasets.card import DatasetMetadata, Episode, Field
 from apo_bench.benchmark.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
 from apo_bench.benchmark.sweeps.stopping import Check, stop_at_signals
@@ -70,7 +70,7 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(
 
 def insertions(
     trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
-) -> tuple[About, Iterator[Rollout]]:
+) -> tuple[DatasetMetadata, Iterator[Episode]]:
     """Have a policy insert, trial by trial, all scenarios one after the other.
 
     Args:
@@ -86,7 +86,7 @@ def insertions(
     made = ", ".join(f"{name}={x!r}" for name, x in (env.spec.kwargs if env.spec else {}).items() if name != "scenario")
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
     fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
-    about = About(
+    about = DatasetMetadata(
         name="insertions",
         summary="A robot holds a part before its mouth and is led by a policy until it lets go, in `APOInsert-v0` of "
         f"apo_bench; the policy is `{policy}`. The environment is made with `{made}`; then "
@@ -101,7 +101,7 @@ def insertions(
     return about, _rollouts(trials, policy, act, say)
 
 
-def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Rollout]:
+def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Episode]:
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
@@ -120,11 +120,12 @@ def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callabl
             with _policy(policy):
                 action = np.asarray(decide(env, seen), dtype=np.float64)
             actions.append(np.clip(action, -1.0, 1.0).astype(np.float32))
-            seen, reward, over, _, info = env.step(actions[-1])
+            seen, reward, terminated, truncated, info = env.step(actions[-1])
+            over = terminated or truncated
             sights.append(seen)
             rewards.append(reward)
         told = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
-        yield Rollout(
+        yield Episode(
             seed=trial.seed,
             task=f"{scenario.title}: insert the part in the hand, the last one.",
             observations={name: np.array([each[name] for each in sights]) for name in seen},
@@ -156,7 +157,7 @@ def make_dataset(
     policy: str | None = None,
     say: Callable[[str], None] = print,
 ) -> tuple[int, int]:
-    """Run trials and write them, with a card `README.md` and `croissant.json`.
+    """Run trials and write them, with a card `README.md`.
 
     The same trials give the same bytes on one machine. A signal (Ctrl-C, SIGTERM) or a policy that raises ends the data
     set early: after the trial that runs, with the episodes that were made. A second signal, or a full disk, ends it at
@@ -219,7 +220,7 @@ def make_dataset(
     return counted
 
 
-def _write_rollouts(form: str, rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
+def _write_rollouts(form: str, rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     if form == "minari":
         return write_minari(rollouts, about, out)
     from apo_bench.benchmark.datasets.lerobot import write_lerobot

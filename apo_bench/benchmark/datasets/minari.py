@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.benchmark.datasets.card import About, Field, Rollout, noise_sheet
+from apo_bench.benchmark.datasets.card import DatasetMetadata, Episode, Field, write_card
 from apo_bench.errors import missing_package
 from apo_bench.io import replace_file, write_file
 
@@ -43,7 +43,7 @@ def load_h5py() -> Any:
     return h5py
 
 
-def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
+def write_minari(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write episodes, and the card.
 
     Returns:
@@ -86,11 +86,11 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN},
         f"{where}: attributes of each": {**_OF_EPISODE, **about.episodes},
     }
-    noise_sheet(about, out, (episodes, right), tables)
+    write_card(about, out, (episodes, right), tables)
     return episodes, right
 
 
-def _add(group: Any, rollout: Rollout, episode: int) -> None:
+def _add(group: Any, rollout: Episode, episode: int) -> None:
     """One episode."""
     rewards = np.asarray(rollout.rewards, dtype=np.float64)
     of_rewards = {f"rewards_{name}": getattr(rewards, name)() for name in ("max", "min", "mean", "std", "sum")}

@@ -33,7 +33,7 @@ ScenarioArgument = Annotated[
 MethodArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[METHOD]",
+        metavar="METHOD",
         help="A name from `apo-bench method list`, or package.module:name.",
         autocompletion=completion("method"),
     ),

@@ -50,13 +50,7 @@ class Solution:
 
 
 def solve_newton(
-    equations: Equations,
-    poses: Array,
-    free: Collection[int],
-    *,
-    cut_off: float = SINGULAR_CUT_OFF,
-    length_m: float = LENGTH_M,
-    iterations: int = _ITERATIONS,
+    equations: Equations, poses: Array, free: Collection[int], *, cut_off: float = SINGULAR_CUT_OFF
 ) -> Solution:
     """Change the free poses, as little as the contacts ask for, until the equations hold or nothing moves any more.
 
@@ -68,34 +62,25 @@ def solve_newton(
         poses: (n, 4, 4), where to begin, world frame, [m].
         free: Operations whose motion parameters may change, counted from 0.
     """
-    solution = descend(equations, poses, free, cut_off=cut_off, length_m=length_m, iterations=iterations)
+    solution = _descend(equations, poses, free, cut_off)
     if solution.at_rest and any(iterate.rank > solution.rank for iterate in solution.trace):
-        again = descend(
-            equations, poses, free, cut_off=cut_off, length_m=length_m, iterations=iterations, at_most=solution.rank
-        )
+        again = _descend(equations, poses, free, cut_off, at_most=solution.rank)
         if again.at_rest and again.gap_m <= solution.gap_m + REST_M:
             return again
     return solution
 
 
-def descend(
-    equations: Equations,
-    poses: Array,
-    free: Collection[int],
-    *,
-    cut_off: float = SINGULAR_CUT_OFF,
-    length_m: float = LENGTH_M,
-    iterations: int = _ITERATIONS,
-    at_most: int | None = None,
+def _descend(
+    equations: Equations, poses: Array, free: Collection[int], cut_off: float, at_most: int | None = None
 ) -> Solution:
     """One descent: at each iteration T <- T dT(dq), q <- 0, of the rank that the cut-off finds or `at_most`."""
     now = np.array(poses)
     changing = np.array(sorted(free), dtype=np.intp)
     trace = list[Iterate]()
     # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 12 with scaled unknowns).
-    units = np.array([1.0, 1.0, 1.0, length_m, length_m, length_m] * len(changing))
+    units = np.array([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
-    for iteration in range(iterations + 1):
+    for iteration in range(_ITERATIONS + 1):
         e, J = equations.linearised(now)
         try:
             step, rank = least_step(J[:, columns] / units, e, cut_off, at_most)
@@ -103,7 +88,7 @@ def descend(
             return Solution(np.array(poses), trace[0].gap_m if trace else largest(e), 0, False, False, tuple(trace))
         size = float(np.linalg.norm(step))
         trace.append(Iterate(largest(e), rank, size))
-        if size < REST_M or iteration == iterations:
+        if size < REST_M or iteration == _ITERATIONS:
             break
         # T <- T dT(dq), q <- 0: the derivatives of the appendix hold at q = 0 only.
         now[changing] = now[changing] @ displacement((step / units).reshape(-1, 6))

@@ -12,22 +12,20 @@ from apo_bench.scenario.parts.allowed import THINNEST_M
 
 FLOOR_M = 0.002
 """The height of the lowest point of a part in its fixture over the table."""
-_CELL_M = 0.004
-_MOST = 9
-"""Columns are about so wide, and at most so many each way."""
+_CELL_M = 0.004  # width of a column
+_MOST = 9  # columns each way
 _BESIDE_M = 0.0025
-"""Columns end so far inside of the box around the part, for fingers beside it."""
+"""The distance of columns inside of the box around the part, for fingers."""
 _RAYS = 3
 """Rays each way by which the height of a column is found."""
 _INSET_M = 1e-6
 _BELOW_M = 1e-5
-"""A part begins so far above its nest, and settles."""
-_WALL_M = 0.005
-_PLAY_M = 0.00015
+"""A part begins at this height above its fixture, and settles."""
+_WALL_M = 0.005  # thickness of a wall
+_PLAY_M = 0.00015  # between a wall and the part
 _CORNERS = np.array([[-1.0, -1, 0], [-1, 1, 0], [1, -1, 0], [1, 1, 0]])
-_WALLED = 0.4
-_HIGHEST_M = 0.02
-"""Walls are so thick, so far from the part, and so high: a part of its height, but no higher than this."""
+_WALL_SHARE = 0.4  # height of a wall, as a share of that of the part
+_HIGHEST_M = 0.02  # of a wall
 
 
 def make_fixture(name: str, solid: Solid, R: Array) -> Solid:
@@ -59,8 +57,8 @@ def _columns(solid: Solid, R: Array, rise: float, low: Array, high: Array) -> li
     boxes = []
     for y0, y1 in pairwise(y):
         tops = [_lowest_above(solid, R, (x0, y0), (x1, y1)) + rise - _BELOW_M for x0, x1 in pairwise(x)]
-        for top, alike in groupby(range(len(tops)), key=lambda i: round(tops[i], 6)):
-            run = list(alike)
+        for top, same in groupby(range(len(tops)), key=lambda i: round(tops[i], 6)):
+            run = list(same)
             if np.isfinite(top):
                 boxes.append(_box_between((x[run[0]], y0, 0.0), (x[run[-1] + 1], y1, top)))
     return boxes
@@ -87,7 +85,7 @@ def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
 
 def _walls(low: Array, high: Array) -> list[Box]:
     """Four walls around a box, on the table."""
-    top = FLOOR_M + min(_WALLED * (high[2] - low[2]), _HIGHEST_M)
+    top = FLOOR_M + min(_WALL_SHARE * (high[2] - low[2]), _HIGHEST_M)
     middle, reach = (low + high)[:2] / 2, (high - low)[:2] / 2 + _PLAY_M
     boxes = []
     for axis, sign in ((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)):

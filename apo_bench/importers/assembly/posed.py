@@ -8,10 +8,10 @@ from typing import Annotated, final
 import msgspec
 import numpy as np
 
-from apo_bench.errors import InputError, require
+from apo_bench.errors import require
 from apo_bench.geometry import Array, Solid, pose, world_bounds
-from apo_bench.importers.cad.solids.naming import free_name
-from apo_bench.io import read_bytes
+from apo_bench.importers.cad.solids import free_name
+from apo_bench.io import Table, read_typed
 from apo_bench.scenario.parts import load_part, part_path
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
@@ -35,12 +35,12 @@ class PosedPart:
     """(4, 4), in the frame of the assembly, [m]."""
     color: tuple[float, ...] | None = None
     fit: Mapping[str, float] = field(default_factory=dict)
-    """Faces that recede although the file does not say so, and by how much before the clearance, [mm]."""
+    """More faces that fit than the part file marks -> by how much they recede before the clearance, [mm]."""
     title: str = ""
     """Its name in the CAD file, where that cannot be its name here."""
 
 
-class _Pose(msgspec.Struct, forbid_unknown_fields=True):
+class _Pose(Table, frozen=True):
     """One table of a file of poses."""
 
     part: str
@@ -51,7 +51,7 @@ class _Pose(msgspec.Struct, forbid_unknown_fields=True):
     color: tuple[_Share, _Share, _Share] | None = None
 
 
-class _PoseFile(msgspec.Struct, forbid_unknown_fields=True):
+class _PoseFile(Table, frozen=True):
     """A file of poses."""
 
     pose: list[_Pose]
@@ -66,10 +66,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
     """
-    try:
-        stated = msgspec.toml.decode(read_bytes(poses, "file of poses"), type=_PoseFile).pose
-    except (msgspec.DecodeError, ValueError) as error:
-        raise InputError(f"{poses}: {' '.join(str(error).split())}.") from error
+    stated = read_typed(poses, _PoseFile, "file of poses").pose
     paths = {part_path(file).stem: part_path(file) for file in files}
     solids: dict[Path, Solid] = {}
     parts: list[PosedPart] = []
@@ -91,7 +88,7 @@ def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, 
     """Return the same assembly, upright, its lowest point on the table, its middle over the origin.
 
     Args:
-        up: The axis of the poses that looks up, of `UPS`.
+        up: The axis of the poses that points up, of `UPS`.
     """
     axis, sign = UPS[up]
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])

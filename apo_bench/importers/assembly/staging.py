@@ -12,26 +12,26 @@ from apo_bench.geometry import Array, Hull, Piece, Solid, extent
 from apo_bench.scenario.scenario import Site
 
 _LOW_M = 2e-5
-"""Corners so near to the lowest one carry."""
+"""Corners within this height of the lowest one carry."""
 _LEAST_M = 5e-4
 _SLOPE = 0.04
-"""The centre of mass lies at least so far inside of what carries, and so much of its height."""
+"""Margins of a centre of mass inside of the area that carries: a length, and a share of its height."""
 _LEVEL = 1e-6
 _BASE_M = (-0.42, 0.0)
-"""Where the arm that comes with the benchmark stands; it reaches the table between two distances."""
-_NEAREST_M = 0.27
+"""The base of the arm of the package."""
+_NEAREST_M = 0.27  # from the base, of what the arm reaches
 _FARTHEST_M = 0.66
 _LIKED_M = (0.05, 0.27)
-"""Parts wait as near as can be to here, on either side."""
+"""Parts start as near as possible to this place, on either side."""
 _ROOMS_M = (0.055, 0.04, 0.03)
-"""Between what waits, for fingers: as much as there is."""
+"""Distances between parts, for fingers: the first one that fits."""
 _GRID_M = 0.01
 _SPREAD_M = (0.04, 0.06)
 _LEAST_SPREAD_M = 0.005
 _YAW_DEG = 28.0
 _YAW_BESIDE_DEG = 8.0
 _LARGE_M = (0.13, 0.16)
-"""An assembly that reaches so far from its middle is moved by no more than the least."""
+"""Reaches from the middle of an assembly beyond which the site has the smallest spread, along x and y."""
 
 
 class Stance(NamedTuple):
@@ -45,7 +45,7 @@ class Stance(NamedTuple):
 
 
 def find_stance(solid: Solid, R: Array) -> Stance:
-    """How a solid stands that is turned like this, (3, 3)."""
+    """Return how a solid with an orientation, (3, 3), stands."""
     up = R[2]
     low = extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
@@ -78,10 +78,10 @@ def _lowest(piece: Piece, up: Array, low: float) -> Array:
 
 
 def choose_site(reach_m: float, is_beside: bool) -> Site:
-    """A place for an assembly that reaches so far from its middle.
+    """Return a site for an assembly that reaches `reach_m` from its middle.
 
     Args:
-        is_beside: Whether a sub-assembly is put together beside it.
+        is_beside: Whether a sub-assembly is put together next to it.
     """
     x, y = np.clip(np.subtract(_LARGE_M, reach_m), _LEAST_SPREAD_M, _SPREAD_M).round(3).tolist()
     yaw = float(np.radians(_YAW_BESIDE_DEG if is_beside else _YAW_DEG))
@@ -91,7 +91,7 @@ def choose_site(reach_m: float, is_beside: bool) -> Site:
 
 
 def find_reach(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) -> float:
-    """How far parts reach from the origin over the table, [m]."""
+    """Return how far parts reach from the origin of the table, [m]."""
     boxes = [_box(solids[part], poses[part][:3, :3]) + poses[part][:2, 3] for part in parts]
     return max((float(np.hypot(*np.abs(box).max(axis=0))) for box in boxes), default=0.0)
 

@@ -145,7 +145,7 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
 
 
 def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Facing | None:
-    """How the two faces of a contact look at each other; None if they do not."""
+    """How the two faces of a contact face each other; None if they do not."""
     a, b = contact
     pairs = facing(
         solids[a.part],

@@ -5,8 +5,7 @@ import shapely
 
 from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straighten
 from apo_bench.importers.cad.faces.fitting import ON_WALL
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import RawSolid, Region, square_to
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids import RawSolid
 from apo_bench.io import default_looks, save_figure
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
@@ -32,11 +32,11 @@ def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) ->
 
 
 def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
-    """The triangles that look to the eye, and the name of each face on the largest of its own."""
+    """Draw the triangles that face the viewer, and the name of each face on its largest triangle."""
     mesh = raw.mesh
     e, a = np.radians([elevation, azimuth])
-    pose_source = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    height = mesh.across @ pose_source
+    viewer = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    height = mesh.across @ viewer
     points = mesh.corners[mesh.triangles]
     for color in np.unique(colors[height > 0.0]).tolist():
         triangles = mesh.triangles[(colors == color) & (height > 0.0)]
@@ -45,7 +45,7 @@ def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: fl
     for name, region in raw.named().items():
         largest = region.triangles[int(height[region.triangles].argmax())]
         if height[largest] > 0.0:
-            at = points[largest].mean(axis=0) + 0.02 * mesh.extent * pose_source
+            at = points[largest].mean(axis=0) + 0.02 * mesh.extent * viewer
             axes.text(*at, name, ha="center", fontsize=9, zorder=1000, bbox=box)
     axes.set_aspect("equal")
     axes.view_init(elevation, azimuth)

@@ -9,8 +9,7 @@ import numpy as np
 
 from apo_bench.importers.cad.importing import ImportedPart
 from apo_bench.importers.cad.meshes.mesh_file import CadFile
-from apo_bench.importers.cad.solids.naming import clean_title
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Region, clean_title
 
 
 def report_file(file: CadFile, path: Path, parts: Sequence[ImportedPart], poses: Path | None) -> dict[str, Any]:
@@ -47,7 +46,6 @@ def report_part(part: ImportedPart) -> dict[str, Any]:
 def _report_face(part: ImportedPart, name: str, region: Region) -> dict[str, Any]:
     report: dict[str, Any] = {
         "kind": region.kind,
-        "residual_um": 1e3 * region.residual,
         "no_contact": part.refused.get(name),
         "share": part.shares.get(name, 1.0),
     }

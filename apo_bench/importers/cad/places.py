@@ -1,4 +1,4 @@
-"""The file of poses that says where a CAD file has its parts."""
+"""Write the file of poses with the places of the parts of a CAD file."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.importers.cad.solids.naming import clean_title, part_name
-from apo_bench.importers.cad.solids.raw_solid import SolidPlace
+from apo_bench.importers.cad.solids import SolidPlace, clean_title, part_name
 from apo_bench.io import write_file
 
 
@@ -29,7 +28,7 @@ def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, s
 
 
 def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, source: str) -> Path:
-    """Write `poses.toml`, which `scenario new` reads beside the part files."""
+    """Write `poses.toml`, which `scenario new` reads with the part files."""
     lines = [f"# where {source} has its parts".replace("\n", " ")]
     for part, name, place in places:
         packed = pose.pack(place.T)

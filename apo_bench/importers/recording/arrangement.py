@@ -56,7 +56,7 @@ def arrange(
 
     Raises:
         NoOrder: The moves are not the operations.
-        InputError: The camera file does not say where the camera stands.
+        InputError: The camera file states no pose of the camera.
     """
     solved = find_camera(intervals, camera, planned, assembly.fixed)
     X = solved.T_world_camera

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from apo_bench.geometry import Array, frozen, pose
 
 _FRAME_FLOOR = frozen(np.repeat([2e-5, 2e-4], 3), 6)
-"""No axis of one frame is surer than this, [m, rad]: what a file with rounded numbers can say."""
+"""The smallest deviation of one frame, [m, rad]: files have rounded numbers."""
 _FAR = 5.0
 """A frame that is farther off, in standard deviations of any axis, is an outlier: 1 in 300,000 by chance."""
 _ROUNDS = 12
 _MAD = 1.4826
 _PRIOR = 8.0
-"""What is known of other rests counts like so many frames of this one."""
+"""The weight of other rests, in frames of this one."""
 
 
 @final
@@ -30,7 +30,7 @@ class Mean:
     inlier: NDArray[np.bool_]
     """(n,), whether each frame counts."""
     independent: float
-    """Independent frames that say as much as all inliers do, whose errors are alike from frame to frame."""
+    """The number of independent frames with the information of all inliers, whose errors are correlated."""
 
     @property
     def covariance(self) -> Array:
@@ -66,7 +66,7 @@ def pool_mean(mean: Mean, others: Array) -> Mean:
     """The mean with a covariance that also knows the frames of other rests.
 
     Args:
-        others: (6, 6), covariance of one frame there, in the axes of the camera, as few frames say little.
+        others: (6, 6), covariance of one frame there, in the axes of the camera.
     """
     # The mean of two covariances, weighted by degrees of freedom: that of an inverse Wishart prior of _PRIOR frames.
     n = float(mean.inlier.sum())
@@ -95,7 +95,7 @@ def _middle(T: Array) -> Array:
 
 
 def _near(xi: Array) -> NDArray[np.bool_]:
-    """Which frames are no outliers: at least half of them, since few frames say little of their spread."""
+    """Which frames are no outliers: at least half of them, since few frames do not show their spread."""
     off = np.abs(xi - np.median(xi, axis=0))
     worst = (off / np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)).max(axis=1)
     return np.asarray(worst <= max(_FAR, float(np.median(worst))))

@@ -1,4 +1,4 @@
-"""CAMERA.toml: how a log is written, and where its camera and the parts that it knows stand."""
+"""CAMERA.toml: how a log is written, and the places of its camera and of known parts."""
 
 import re
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ NamedEntries = Annotated[dict[str, Any], Meta(min_length=1)]
 
 
 class Conventions(Table, frozen=True, kw_only=True):
-    """How a log is written, where its columns do not say it."""
+    """How a log is written, where its columns do not show it."""
 
     length: Literal["mm", "cm", "m"] | None = None
     angle: Literal["deg", "rad"] | None = None
@@ -54,7 +54,7 @@ class NoiseTable(Table, frozen=True, kw_only=True):
 
 
 class CameraTable(Table, frozen=True, kw_only=True):
-    """What stands in the file."""
+    """The tables of the file."""
 
     schema: Literal["apo-bench/camera/1"]
     log: Conventions = Conventions()
@@ -66,7 +66,7 @@ class CameraTable(Table, frozen=True, kw_only=True):
 @final
 @dataclass(frozen=True, eq=False)
 class CameraFile:
-    """What a camera file states."""
+    """The statements of a camera file."""
 
     conventions: Conventions
     T_world_camera: Array | None

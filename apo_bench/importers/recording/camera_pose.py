@@ -27,7 +27,7 @@ class CameraPose:
     T_world_camera: Array
     """(4, 4), [m]."""
     residuals: Mapping[str, Array] = field(default_factory=dict)
-    """Part -> (6,), the body twist from its known place to where the camera sees it; empty of a stated pose."""
+    """Part -> (6,), the body twist from its known place to the observed one; empty of a stated pose."""
     covariance: Array | None = None
     """(6, 6), of the body twist by which the pose is wrong, [m, rad]; None of a stated pose."""
 

@@ -22,7 +22,7 @@ _WIDE_MM = 50.0
 _LEFT_OVER = 5.0
 """The penalty of an interval to which no operation leads."""
 _OVERLAP_S = 0.3
-"""A part may be taken so long before the part before it rests."""
+"""A part may be taken this time before the previous part rests."""
 _CLOSE = 0.3
 """Choices whose worth differs by less are rivals."""
 

@@ -20,7 +20,7 @@ LEAST_REST_S = 0.3
 _FEWEST = 4
 """Frames of a rest."""
 _ENOUGH_HZ = 30.0
-"""Rests are looked for in so many frames a second."""
+"""Frames a second in which rests are searched."""
 _LEAST = frozen(np.repeat([2e-4, 1.7e-3], 3), 6)
 """Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
 _STILL = 5.3
@@ -164,9 +164,10 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
 
 
 def _alike(xi: Array) -> float:
-    """How many times the variance of a mean is that of independent frames: errors of neighbours may be alike.
+    """How many times the variance of a mean is that of independent frames: errors of neighbours may be correlated.
 
-    Told by differences, which a shift of the mean does not touch: their mean square is 2 (1 - r) times the variance.
+    It follows from differences, which a shift of the mean does not change: their mean square is 2 (1 - r) times the
+    variance.
     """
     # Neighbours differ by 2 (1 - r) v in the mean square, frames that are far apart by 2 v. The variance of a mean of
     # errors with correlation r from frame to frame is (1 + r) / (1 - r) times that of independent ones.

@@ -1,4 +1,4 @@
-"""Put a surface where measured points are, by small_gicp, and say how well that is known."""
+"""Fit a surface to measured points with small_gicp, with the covariance of the fit."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _LEAST_NOISE_M = 0.0001
 """What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
 BENT_M = 0.003
 """Noise of this size doubles the covariance: beside an edge the nearest surface is then often not the one that was
-hit, which the linear part of the formula does not know. Measured by `python benchmarks/depth_camera.py` of the repository."""
+hit, which the linear part of the formula does not know. `benchmarks/depth_camera.py` measures it."""
 PRIOR = frozen([0.05] * 3 + [0.5] * 3, 6)
 """Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say
 nothing, and states for them how little that is."""

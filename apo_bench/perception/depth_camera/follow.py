@@ -1,4 +1,4 @@
-"""Follow a demonstration from range image to range image: what moved, which part it was, where it went."""
+"""Follow a demonstration from range image to range image: which part moved, and where to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sa
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""
 _GRID = 3
-"""Every so many pixels are asked what is seen there."""
+"""Every so many pixels are looked up."""
 
 
 @final

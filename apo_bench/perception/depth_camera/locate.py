@@ -1,4 +1,4 @@
-"""Recognise what appeared among the models, and locate it: fit every model, keep the one that explains most."""
+"""Locate what appeared: fit every model, and keep the one that explains most."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ _WIDE_M = 0.012
 _LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03
-"""What explains this much less than the best cannot be told from it so."""
+"""What explains less than the best by no more than this may be the right one."""
 
 
 @final

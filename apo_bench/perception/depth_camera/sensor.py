@@ -1,4 +1,4 @@
-"""The range finder as a sensor of poses: from true range images of a demonstration to an observation of it."""
+"""The range finder as a sensor of poses: range images in, an observation out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
 class RangeSensor:
     """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
 
-    Of what was shown only the topology, where parts started and how careless people are is looked at; goals are
+    Of the demonstration it uses only the topology, the start poses and the covariance of the human error; poses are
     fitted to range images. Where a part looks the same when turned, the turn nearest to the planned one is reported,
     and nothing else is taken from the plan.
     """
@@ -41,19 +41,19 @@ class RangeSensor:
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         events = self.events(demonstration, self.sensed(rng))
-        goals = np.array([demonstration.start[operation.main] for operation in assembly.operations])
+        poses = np.array([demonstration.start[operation.main] for operation in assembly.operations])
         covariance = np.repeat(_UNSEEN[None], len(assembly), axis=0)
         seen = np.zeros(len(assembly), dtype=np.bool_)
         for event in events:
             k = event.operation
             if event.found is not None and k is not None:
-                goals[k] = event.found.T
+                poses[k] = event.found.T
                 covariance[k] = event.found.covariance
                 seen[k] = True
         return Observation(
             assembly,
             demonstration.start,
-            goals,
+            poses,
             floor_covariance(covariance + demonstration.human_error_covariance),
             seen,
         )

@@ -1,4 +1,4 @@
-"""Where a fit may begin: the ways in which a part that stands on a table may have the measured points."""
+"""Start poses of a fit: the ways in which a part that stands on a table may have the measured points."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
 
 
 def keep_distinct(turns: Array, same: Array) -> Array:
-    """Rotations without repetition: one, (3, 3), of each set in (k, 3, 3) that symmetries make alike."""
+    """Rotations without repetition: one, (3, 3), of each set in (k, 3, 3) that symmetries make equal."""
     kept: list[Array] = []
     for R in turns:
         if not any((np.abs(K @ same[:, :3, :3] - R).max(axis=(1, 2)) < 1e-9).any() for K in kept):

@@ -1,1 +1,1 @@
-"""Recognition: what is where, which faces touch, in which states of contact, and by which macros they came there."""
+"""Detection of face contacts from observed poses."""

@@ -1,4 +1,4 @@
-"""What is believed of all goals together: a linear filter, in which contacts are measurements.
+"""A linear filter of all poses together, in which contacts are measurements.
 
 Contacts are without noise but for play, and are taken one after the other. The filter serves to tell which contacts go
 together; the correction itself is not its business.
@@ -19,30 +19,30 @@ class PartBeliefs(NamedTuple):
 
     poses: Poses
     reach: Mapping[str, Array]
-    """Part -> (6, 6 n): the world twist (v, w), about the origin, that body twists of all goals make of its pose."""
+    """Part -> (6, 6 n): the world twist (v, w), about the origin, that body twists of all poses make of its pose."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """Goals with one covariance over all of them; the assembly gives who moves and who is carried, no contact."""
+    """Poses with one covariance over all of them; the assembly gives who moves and who is carried, no contact."""
 
     assembly: Assembly
     start: Poses
-    goals: Array
+    poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array
-    """(6 n, 6 n), of the body twists by which the goals are wrong, [m, rad]."""
+    """(6 n, 6 n), of the body twists by which the poses are wrong, [m, rad]."""
 
     def standing(self, k: int) -> PartBeliefs:
-        """Where every part is after operation k, counted from 0, and what errors of the goals do to it.
+        """Where every part is after operation k, counted from 0, and what errors of the poses do to it.
 
         With D' = T D_m^-1 D_s of a carried part, and exp(w) D a displaced D: w' = Ad(T) xi + Ad(T D_m^-1) (w_s - w_m).
         """
-        n = len(self.goals)
+        n = len(self.poses)
         poses = dict(self.start)
         reach = {part: np.zeros((6, 6 * n)) for part in poses}
-        for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.goals, strict=False)):
+        for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.poses, strict=False)):
             # A body twist xi of goal T is the world twist Ad(T) xi; what is carried moves on as the main part does.
             own = np.zeros((6, 6 * n))
             own[:, 6 * i : 6 * i + 6] = pose.adjoint(T)
@@ -64,8 +64,8 @@ class Belief:
         PJ = self.covariance @ J.T
         K = np.linalg.solve(J @ PJ + noise, PJ.T).T
         covariance = self.covariance - K @ PJ.T
-        goals = self.goals @ pose.exp(-(K @ e).reshape(-1, 6))
-        return Belief(self.assembly, self.start, goals, (covariance + covariance.T) / 2)
+        poses = self.poses @ pose.exp(-(K @ e).reshape(-1, 6))
+        return Belief(self.assembly, self.start, poses, (covariance + covariance.T) / 2)
 
 
 def initial_belief(observation: Observation) -> Belief:

@@ -1,4 +1,4 @@
-"""A pair of faces that may touch, within the thresholds of the noise."""
+"""Candidates: pairs of faces that may touch, within the thresholds of the noise."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -19,7 +19,7 @@ class Candidate(NamedTuple):
     contact: Contact
     pair: Facing
     slope: Array
-    """(r, 6 n): derivative of its residual by body twists of all goals; r is 3 of flat faces."""
+    """(r, 6 n): derivative of its residual by body twists of all poses; r is 3 of flat faces."""
     noise: Array
     """(r, r): see `reality`."""
     most: PairThresholds
@@ -50,8 +50,8 @@ def judge_pair(
 
     Args:
         T_b: Where part b is, (4, 4), world, [m].
-        slope: (r, 6 n): derivative of the residual by body twists of all goals.
-        C: (r, r): covariance of the residual, from the goals alone.
+        slope: (r, 6 n): derivative of the residual by body twists of all poses.
+        C: (r, r): covariance of the residual, from the poses alone.
     """
     contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
     play_m = seen.assembly.play(contact, seen.play_m)
@@ -59,7 +59,7 @@ def judge_pair(
     most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
     if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
         return None
-    # Squared Mahalanobis length: C is of the goals, noise of play and softness of a contact that is there.
+    # Squared Mahalanobis length: C is of the poses, noise of play and softness of a contact that is there.
     distance = float(pair.residual @ np.linalg.solve(C + noise, pair.residual))
     is_flat = not seen.assembly.is_round(contact)
     normal = T_b[:3, :3] @ seen.assembly.face(contact.environment).normal if is_flat else np.zeros(3)

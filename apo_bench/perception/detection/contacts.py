@@ -1,8 +1,8 @@
-"""Which face touches which, from what was seen: solids, poses and their stated noise (Section 1, first half).
+"""Detect which face touches which, from solids, observed poses and their stated noise (Section 1, first half).
 
 Operation by operation, faces of the parts that moved are held against faces of the parts that stand there. A pair is a
 candidate if its normals are opposite within an angle, its gap is small and its overlap large enough. Noise moves whole
-parts, so the contacts of an operation are not judged one by one: the likeliest is believed, the goals are put where
+parts, so the contacts of an operation are not judged one by one: the likeliest is taken, the poses are put where
 that one closes, and the others are looked at from there. Where that leaves candidates over, other beginnings are tried
 and the likeliest set wins (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the
 joint compatibility test", 2001).
@@ -35,7 +35,7 @@ _BEGINNINGS = 12
 
 @check_arguments
 def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> DetectedContacts:
-    """Find the face contacts of every operation; those that the observation came with are not looked at.
+    """Detect the face contacts of every operation; those of the observation itself are ignored.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
     contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
@@ -50,7 +50,7 @@ def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> 
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    is_uncorrected = placements(assembly, observation.start, belief.goals)
+    is_uncorrected = placements(assembly, observation.start, belief.poses)
     standing = set(assembly.fixed)
     for k, (operation, poses) in enumerate(zip(assembly.operations, is_uncorrected, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
@@ -106,7 +106,7 @@ class _Around:
         return best
 
     def _follow(self, belief: Belief, first: Contact | None) -> _Found:
-        """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
+        """Take the likeliest candidate (or a given one), put the poses where it closes, and look again."""
         at_first = at_hand = self.candidates(belief)
         taken = list[Candidate]()
         total = 0.0
@@ -123,7 +123,7 @@ class _Around:
 
     def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
-        # Body twists of all goals -> world twist of part a beside part b -> gap and tilts of the pair.
+        # Body twists of all poses -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.observed].any():
             return
@@ -136,10 +136,10 @@ class _Around:
 def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
     """What a pair that closes gains, before its squared length is taken off.
 
-    Along every axis in which the goals leave it uncertain, (range)^2 / (2 pi variance), the range being that within
+    Along every axis in which the poses leave it uncertain, (range)^2 / (2 pi variance), the range being that within
     the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
     """
-    # Scaled by the range, eigenvectors of C are axes that are independent; an axis along which goals are no less sure
+    # Scaled by the range, eigenvectors of C are axes that are independent; an axis along which poses are no less sure
     # than contacts are exact was decided before.
     span = np.array([2 * rules.gap_m] * lengths + [2 * rules.angle_rad] * (len(C) - lengths))
     variance, V = np.linalg.eigh(C / np.outer(span, span))

@@ -1,4 +1,4 @@
-"""Goals and contacts together: where the goals are if a set of contacts holds, and how likely the set is.
+"""Estimate poses under a set of contacts, and how likely that set is.
 
 Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a room that is
 much wider than the noise. What contacts leave at the observation, r = J xi - e, has the covariance J C J^t + S in the
@@ -39,12 +39,12 @@ _SMALL = 1e-5
 
 @final
 @dataclass(frozen=True, eq=False)
-class GoalEstimate:
-    """The likeliest goals of the first operations if some contacts hold."""
+class PoseEstimate:
+    """The likeliest poses of the first operations if some contacts hold."""
 
     assembly: Assembly
     """The first n operations, with these contacts."""
-    goals: Array
+    poses: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array
     """(6 n, 6 n), of the body twists by which they are wrong, [m, rad]."""
@@ -54,25 +54,25 @@ class GoalEstimate:
     """-2 log of the Bayes factor of the contacts against none."""
 
 
-def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimate:
-    """Solve for goals and contacts together.
+def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimate:
+    """Solve for poses and contacts together.
 
     Args:
         seen: What was seen; its contacts do not matter.
         assembly: Its first n operations, with the contacts that are supposed.
-        begin: (n, 4, 4), goals to begin with.
+        begin: (n, 4, 4), poses to begin with.
     """
     n = len(begin)
     C = joint_covariance(seen.poses, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
     room = C + np.diag(np.tile(_ROOM**2, n))
     back = pose.inverse(seen.poses[:n])
-    goals = begin
+    poses = begin
     system = contact_equations(assembly, seen.start, begin)
     S = _softness(assembly, seen.play_m)
-    xi = pose.log(back @ goals)
+    xi = pose.log(back @ poses)
     for _ in range(_TURNS):
-        # Goals are seen.goals exp(xi); equations are linear in body twists at the goals, which are Jr d(xi).
-        e, J = system.linearised(goals)
+        # Poses are seen.poses exp(xi); equations are linear in body twists at the poses, which are Jr d(xi).
+        e, J = system.linearised(poses)
         Jr = right_jacobian(xi)
         J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
         CJ = C @ J.T
@@ -82,17 +82,17 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimat
         new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
         step = np.abs(new - xi).max(initial=0.0)
         xi = new
-        goals = seen.poses[:n] @ pose.exp(xi)
+        poses = seen.poses[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
     # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.
     B = J @ room @ J.T + S
     badness = float(r @ np.linalg.solve(A, r) - (np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]))
-    return GoalEstimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
+    return PoseEstimate(assembly, poses, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
 
 
 def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
-    """What is uncertain of goals once equations hold, as body twists at these goals."""
+    """What is uncertain of poses once equations hold, as body twists at these poses."""
     n = len(Jr)
     JC = J @ C
     left = C - JC.T @ np.linalg.solve(A, JC)

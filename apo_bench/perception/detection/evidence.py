@@ -1,4 +1,4 @@
-"""Recognised contacts, and why each is believed."""
+"""Detected contacts, with the evidence for each."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from apo_bench.perception.detection.thresholds import PairThresholds
 @final
 @dataclass(frozen=True)
 class Evidence:
-    """Why a contact is believed: what was measured when it was taken, and what was allowed."""
+    """The evidence for a contact: what was measured when it was taken, and what was allowed."""
 
     contact: Contact
     made: int
@@ -24,7 +24,7 @@ class Evidence:
     most: PairThresholds
     """The thresholds."""
     seen_gap_m: float
-    """The gap at the goals as they were seen."""
+    """The gap at the poses as they were seen."""
 
 
 class Rival(NamedTuple):
@@ -37,7 +37,7 @@ class Rival(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class DetectedContacts:
-    """The assembly with the contacts that were recognised, all of them asked to coincide."""
+    """The assembly with the contacts that were detected, in all of which faces coincide."""
 
     assembly: Assembly
     evidence: tuple[Evidence, ...]

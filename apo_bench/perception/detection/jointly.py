@@ -1,7 +1,7 @@
-"""Contacts and poses decided together: of many sets of contacts the one that explains best what was seen.
+"""Detect contacts and estimate poses together: of many sets of contacts the one that explains the poses best.
 
 Operation by operation, pairs of faces that may touch are taken or refused, the surest first; each set is scored with
-the goals that it asks for (`estimate`), by how much better it explains what was seen than chance does, less what it
+the poses that it asks for (`estimate`), by how much better it explains what was seen than chance does, less what it
 takes for granted: relations beyond the first, and what physics forbids. The best few sets go on to the next operation,
 which may turn the order round: a stick that fits through two castles says how these were stacked.
 """
@@ -47,7 +47,7 @@ evidence away, beyond what physics says against the best."""
 
 @check_arguments
 def detect_contacts_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -> DetectedContacts:
-    """Find the face contacts of every operation together; those that the observation came with are not looked at.
+    """Detect the face contacts of every operation together; those of the observation itself are ignored.
 
     Returns:
         The best set, with how likely it is among those that were compared to the end, and the next best one.
@@ -77,7 +77,7 @@ class _History:
     """The contacts of the operations so far, and what comes of them."""
 
     taken: tuple[tuple[Candidate, ...], ...] = ()
-    goals: Array | None = None
+    poses: Array | None = None
     surprise: float = 0.0
     badness: float = 0.0
 
@@ -88,7 +88,7 @@ class _History:
 
     def follow(self, partial: "_Partial") -> "_History":
         """With one operation more."""
-        return _History((*self.taken, partial.taken), partial.at.estimate.goals, partial.surprise, partial.badness)
+        return _History((*self.taken, partial.taken), partial.at.estimate.poses, partial.surprise, partial.badness)
 
 
 class _Partial(NamedTuple):
@@ -120,9 +120,9 @@ class _Search:
 
     def endings(self) -> Iterator[_Partial]:
         """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
-        goals = self.seen.poses[self.k : self.k + 1]
-        before = self.history.goals
-        beginning = self._with((), goals if before is None else np.concatenate([before, goals]))
+        poses = self.seen.poses[self.k : self.k + 1]
+        before = self.history.poses
+        beginning = self._with((), poses if before is None else np.concatenate([before, poses]))
         waiting: list[tuple[float, int, _Partial]] = [(0.0, 0, beginning)]
         ended = 0
         steps = 0
@@ -178,7 +178,7 @@ class _Search:
 
     def _taking(self, partial: _Partial, some: tuple[Candidate, ...]) -> _Partial:
         rare = sum(self._rare(partial, c) for c in some if not c.implied)
-        return self._with((*partial.taken, *some), partial.at.estimate.goals, partial.refused, partial.surprise + rare)
+        return self._with((*partial.taken, *some), partial.at.estimate.poses, partial.refused, partial.surprise + rare)
 
     def _with(
         self,
@@ -187,7 +187,7 @@ class _Search:
         refused: frozenset[Contact] = frozenset(),
         surprise: float | None = None,
     ) -> _Partial:
-        """The set with the goals that it asks for, and what is near there."""
+        """The set with the poses that it asks for, and what is near there."""
         sets = (*self.history.taken, taken)
         at = Situation(self.seen, self.others, estimate(self.seen, _first(self.seen.assembly, sets), begin))
         near = at.candidates(self.rules, [c.contact for c in taken])

@@ -1,6 +1,6 @@
-"""What is certain whatever was seen: parts are not inside each other, and what is let go of rests on something.
+"""Physical constraints on contacts: parts are not inside each other, and what is released rests on something.
 
-Each is told as a surprise, -2 log of how likely it is that a set of contacts gives no offence, given how uncertain
+Each is a surprise, -2 log of how likely it is that a set of contacts gives no offence, given how uncertain
 poses still are. Where parts are inside each other by 3 mm, give or take 5, that is little; give or take 0.1, it is
 out of the question.
 """
@@ -25,7 +25,7 @@ _UNSUPPORTED = 18.0
 _SOFT_M = 0.3e-3
 """Parts may be so deep in each other."""
 _DEEP_M = 2e-3
-"""Where parts that touch are deeper in each other than this, it is asked whether they touch at all once apart."""
+"""Where parts that touch are deeper in each other than this, they must still touch once apart."""
 _UPRIGHT = 0.5
 """A face whose normal has a larger upward part carries weight."""
 _OPPOSITE = -0.9
@@ -93,7 +93,7 @@ def _least_unlikely(
 def _covers(at: Situation, rules: Rules, c: Candidate, moved: Array) -> bool:
     """Whether the faces of a contact cover each other, with the manipulated part moved by (3,), [m].
 
-    Of round faces nothing is said.
+    Round faces always do.
     """
     if at.seen.assembly.is_round(c.contact):
         return True
@@ -111,7 +111,7 @@ def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
     """Of what was let go of: that it rests on nothing, or that its weight acts beside what carries it.
 
-    Where a face above holds it down, it may lean. Of round parts nothing is said.
+    Where a face above holds it down, it may lean. Round parts are not judged.
     """
     solids = at.seen.assembly.solids
     if not at.seen.observed[at.k] or any(solids[part].rounds for part in at.moves):

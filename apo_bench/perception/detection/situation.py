@@ -1,4 +1,4 @@
-"""Where operations put things if some contacts hold: which faces may touch then, and how sure that is."""
+"""The situation after an operation if some contacts hold: candidates for more, and their uncertainty."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.detection.belief import Belief, PartBeliefs
 from apo_bench.perception.detection.candidate import Candidate, judge_pair
-from apo_bench.perception.detection.estimate import GoalEstimate
+from apo_bench.perception.detection.estimate import PoseEstimate
 from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds
 
 _FLAT_M = 0.2e-3
@@ -33,12 +33,12 @@ class Situation:
     seen: Observation
     others: tuple[str, ...]
     """The parts that stand there, and are not moved by the operation."""
-    estimate: GoalEstimate
+    estimate: PoseEstimate
 
     @property
     def k(self) -> int:
         """The operation, counted from 0."""
-        return len(self.estimate.goals) - 1
+        return len(self.estimate.poses) - 1
 
     @property
     def moves(self) -> tuple[str, ...]:
@@ -47,9 +47,9 @@ class Situation:
 
     @cached_property
     def now(self) -> PartBeliefs:
-        """Where every part is, and what errors of the goals do to it."""
+        """Where every part is, and what errors of the poses do to it."""
         known = self.estimate
-        return Belief(known.assembly, self.seen.start, known.goals, known.covariance).standing(self.k)
+        return Belief(known.assembly, self.seen.start, known.poses, known.covariance).standing(self.k)
 
     def pairs(self) -> Iterator[tuple[str, str]]:
         """A part that was moved and one that stands there, both where something was seen."""
@@ -108,5 +108,5 @@ class Situation:
         return pair_thresholds(rules, worst, loose)
 
     def _reach(self, a: str, b: str) -> Array:
-        """(6, 6 n): the world twist of part a beside part b that body twists of the goals make."""
+        """(6, 6 n): the world twist of part a beside part b that body twists of the poses make."""
         return self.now.reach[a] - self.now.reach[b]

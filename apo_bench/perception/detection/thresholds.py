@@ -1,4 +1,4 @@
-"""How near is near enough by the stated noise."""
+"""Thresholds of gap and angle within which the stated noise explains that faces do not touch."""
 
 import math
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Rules:
     miss: float = 1e-4
     """How often the noise may hide one face contact: 20, tested three ways, are then all found 99.4 % of the time."""
     gap_m: float = 10e-3
-    """No gap beyond this is believed to be noise."""
+    """No gap beyond this counts as noise."""
     angle_rad: float = math.radians(20.0)
     """The largest angle between a normal and the opposite of the other."""
     share: float = 0.15
@@ -61,7 +61,7 @@ def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, leng
     if both were as uncertain as the worse direction. Of round faces the gap may be such a length, too.
 
     Args:
-        covariance: (3, 3), of gap and tilts, from the noise of all goals, [m, rad]; (r, r) of round faces.
+        covariance: (3, 3), of gap and tilts, from the noise of all poses, [m, rad]; (r, r) of round faces.
         slack: What play allows in addition.
         lengths: How many rows are lengths, before those of tilts; without any of these the angle is free.
     """

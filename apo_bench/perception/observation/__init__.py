@@ -1,1 +1,1 @@
-"""What a camera sees of a demonstration: noise models, and wrong relations."""
+"""Observations of a demonstration: noise models, reobservations, and wrong contacts."""

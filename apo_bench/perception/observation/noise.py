@@ -1,4 +1,4 @@
-"""What a noise model is, and the one that a name stands for."""
+"""Noise models by name."""
 
 import inspect
 import math
@@ -46,7 +46,7 @@ def make_noise(given: Any, noise_level: NoiseLevel) -> Noise:
         given: A name out of `NOISES`, one out of `FAILURES` with its rates (`flips:p=0.1/r=0.5`),
             `"package.module:name"`, a noise file (`.toml`, the name of one that comes with the package, or
             `"empirical:"` and a file of residuals), or the object: a class is made with the level, a function
-            `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals` that has
+            `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(poses, rng) -> poses` that has
             attributes `deviation_mm` and `deviation_deg`.
         level: How much noise.
 

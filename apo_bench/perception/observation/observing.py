@@ -37,8 +37,8 @@ def observe(
         noise = make_noise(noise, NoiseLevel(*noise_pair(1.0 if noise_level is None else noise_level)))
     elif noise_level is not None:
         raise InputError(
-            f"the level {noise_level!r} was given together with a noise model that is made already; leave the level out, or "
-            "give the name or the class of the model."
+            f"the level {noise_level!r} was given together with a noise model that is made already; leave it out, "
+            "or give the name or the class of the model."
         )
     name = getattr(noise, "__name__", type(noise).__name__)
     try:

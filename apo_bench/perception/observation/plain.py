@@ -1,4 +1,4 @@
-"""A plain function `(poses, rng) -> poses` as a noise model, with the deviations that it declares."""
+"""A plain function `(poses, rng) -> poses` as a noise model."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,10 +31,10 @@ class Plain:
         return str(getattr(self.function, "__name__", type(self.function).__name__))
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        goals = np.array(self.function(demonstration.poses.copy(), rng), dtype=np.float64)
+        poses = np.array(self.function(demonstration.poses.copy(), rng), dtype=np.float64)
         sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
         stated = floor_covariance(np.diag(sigma**2) + demonstration.human_error_covariance)
-        return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+        return Observation(assembly, demonstration.start, poses, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
 def declare(function: Any, name: str) -> Plain:

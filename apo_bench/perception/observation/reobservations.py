@@ -1,4 +1,4 @@
-"""Looks at a demonstration that has been observed once: fresh draws of the same noise, as many as are allowed."""
+"""Observe a demonstration again: fresh draws of the same noise, as many as are allowed."""
 
 from collections.abc import Collection
 from copy import deepcopy
@@ -19,7 +19,7 @@ from apo_bench.records import check
 class Reobservations:
     """A `apo_bench.assembly.Reobserver`: it knows the demonstration, and hands out nothing but observations.
 
-    Each look draws all operations, so that what is seen of one does not depend on which were asked for.
+    Each reobservation draws all operations, so that the pose of one does not depend on which were requested.
     """
 
     def __init__(
@@ -34,8 +34,8 @@ class Reobservations:
         """Args:
             noise: As in `observe`.
             rng: Not the one that the first observation was drawn from, which would change that of others.
-            allowed: How many looks.
-            assembly: What the corrector was told, if that is not right.
+            allowed: How many reobservations.
+            assembly: What the corrector gets, if that is not right.
             first: As the first observation was drawn from, not used yet: noise that has a method `again` (assembly,
                 demonstration, rng, first) may repeat what was false in that.
 
@@ -45,7 +45,7 @@ class Reobservations:
         check("max_reobservations", allowed)
         self.left = allowed
         self.reobservations = 0
-        """Operations that were looked at again, each as often as that was."""
+        """Operations that were observed again, each as often as that was."""
         self._demonstration = demonstration
         self._noise = noise
         self._rng = rng
@@ -58,7 +58,7 @@ class Reobservations:
         require(self.left >= 1, "one more look was asked for, and none is left; ask `look.left` before.")
         require(
             chosen and all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen),
-            f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}.",
+            f"operations {[*chosen]} cannot be reobserved; give one or more whole numbers from 0 to {n - 1}.",
         )
         again = getattr(self._noise, "again", None)
         noise = self._noise if again is None or self._first is None else partial(again, first=deepcopy(self._first))

@@ -1,4 +1,4 @@
-"""Wrong contacts, to see what a corrector makes of them.
+"""Sources of wrong contacts, to test what a corrector makes of them.
 
 `missed`     one contact was not noticed
 `false`      one contact too many: two faces that only come near each other
@@ -42,7 +42,7 @@ _OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
 TOUCHING_M = 0.5e-3
 NEAR_FACES_M = 15e-3
-"""Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
+"""Faces that are closer touch, or nearly; faces that are farther apart make no contact."""
 _COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
 _SHARED = 0.15
@@ -77,7 +77,7 @@ def with_contacts(
     """Return an observation with wrong contacts in place of the right ones.
 
     Args:
-        truth: (n, 4, 4), the true goals, world frame, [m].
+        truth: (n, 4, 4), the true poses, world frame, [m].
 
     Raises:
         InputError: The function raised an error, or returned something other than an assembly of the same operations.
@@ -118,19 +118,19 @@ def culprit(right: Assembly, wrong: Assembly) -> str | None:
     return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
-def missed(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+def missed(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
     """One contact, any, is not there."""
     k, contact = _any(assembly, rng)
     return _with(assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact))
 
 
-def false(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+def false(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
     """One contact too many: a face of a part that was moved and one that it faces, less than 15 mm apart.
 
     Where no two faces come so near, the nearest pair is taken that covers each other, or, failing that, that look at
     each other at all; an assembly without even those is left as it is.
     """
-    pairs = list(_facing(assembly, start, goals))
+    pairs = list(_facing(assembly, start, poses))
     near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_FACES_M]
     if near:
         chosen = near[int(rng.integers(len(near)))]
@@ -151,7 +151,7 @@ class Shifted:
 
     size_m: float = SHIFT_MM * 1e-3
 
-    def __call__(self, assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+    def __call__(self, assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
         k, contact = _any(assembly, rng)
         part, old = contact.environment
         sign = (1.0, -1.0)[int(rng.integers(2))]
@@ -181,24 +181,24 @@ def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
     return chosen.made, chosen.contact
 
 
-def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
+def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
     """Faces of parts that an operation moved, and faces of those that stand there, apart by more than nothing."""
     standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
-    for k, poses in enumerate(placements(assembly, start, goals)):
+    for k, stage in enumerate(placements(assembly, start, poses)):
         moves = assembly.operations[k].moves
         standing |= dict.fromkeys(moves)
         for part in moves:
             for other in (p for p in standing if p not in moves):
                 for a, b in product(assembly.solids[part].faces.values(), assembly.solids[other].faces.values()):
                     contact = Contact(PartFace(part, a.name), PartFace(other, b.name))
-                    apart = height(a, poses[part], b, poses[other])
-                    near = apart > TOUCHING_M and faces_oppose(a, poses[part], b, poses[other], _OPPOSED_RAD)
+                    apart = height(a, stage[part], b, stage[other])
+                    near = apart > TOUCHING_M and faces_oppose(a, stage[part], b, stage[other], _OPPOSED_RAD)
                     if near and contact not in assembly.operations[k].contacts:
-                        area = overlap(a, poses[part], b, poses[other]).area
+                        area = overlap(a, stage[part], b, stage[other]).area
                         yield _Pair(k, contact, apart, area > _COVERED_M2)
                 for c, d in round_pairs(assembly.solids[part], assembly.solids[other]):
                     contact = Contact(PartFace(part, c.name), PartFace(other, d.name))
-                    measured = measure_round(c, poses[part], d, poses[other])
+                    measured = measure_round(c, stage[part], d, stage[other])
                     near = measured.angle_rad < _OPPOSED_RAD and measured.gap_m > TOUCHING_M
                     if near and contact not in assembly.operations[k].contacts:
                         yield _Pair(k, contact, measured.gap_m, measured.share > _SHARED)

@@ -59,11 +59,7 @@ def understand(
     put: dict[str, int] = {}
     for k, operation in enumerate(assembly.operations):
         was = _held_by(assembly, put.get(operation.main), operation.moves)
-        back = (
-            ANY
-            if was is None
-            else Preference(understood[was].after.line.direction, understood[was].after.line.travel_m)
-        )
+        back = ANY if was is None else understood[was].after.line.stated
         before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
         understood.append(OperationMacros(k, operation.main, operation.carries, before, after))

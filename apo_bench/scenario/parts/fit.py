@@ -1,4 +1,4 @@
-"""A part some of whose faces recede although its file does not say so."""
+"""Mark faces of a part as fit, so that they recede by the clearance."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,8 +22,8 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
 
     Raises:
-        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
-            piece.
+        InputError: There is no such face, a face is the side of a box with another one, a hole cannot get wider, or
+            nothing is left of a piece.
     """
     for face in undersizes_mm:
         require_known("face", face, (*solid.faces, *solid.rounds), place="fit")

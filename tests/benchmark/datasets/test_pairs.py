@@ -175,7 +175,7 @@ def test_neither_simulator_nor_torch_is_loaded() -> None:
         ({"scenarios": "dovetial"}, "unknown scenario 'dovetial'"),
         ({"scenarios": "dovetail", "n": 0}, "0 pairs were asked for"),
         ({"scenarios": 5}, "a Path, a Scenario or a list"),
-        ({"scenarios": "dovetail", "noise_level": -1.0}, "noise_level"),
+        ({"scenarios": "dovetail", "noise_level": -1.0}, "noise level"),
     ],
 )
 def test_what_is_wrong_is_said(given: dict[str, object], complaint: str) -> None:

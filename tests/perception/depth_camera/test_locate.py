@@ -14,7 +14,6 @@ from apo_bench.perception.depth_camera.explained import measure_share
 from apo_bench.perception.depth_camera.fit import PRIOR, Points, covariance, refine
 from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
-from apo_bench.perception.depth_camera.regions import find_regions
 from apo_bench.perception.depth_camera.starts import guess_poses
 from apo_bench.perception.depth_camera.surface import join_surfaces, sample_surface
 from apo_bench.simulation.sensor.rays import ModelRays
@@ -80,17 +79,6 @@ def test_points_of_a_surface_are_on_it_and_their_normals_across_it() -> None:
     assert (number >= len(SURFACES["block"].points)).all()
 
 
-def test_noise_alone_is_no_change() -> None:
-    view = RangeFinder().views[0]
-    rng = np.random.default_rng(1)
-    before = range_of({"castle": STANDING}, view)
-    for noise_level in (0.0, 1e-3, 4e-3):
-        noisy = [before + noise_level * rng.standard_normal(before.shape) for _ in range(2)]
-        changed = find_regions(*noisy, noise_level)
-        assert not changed.appeared.any()
-        assert not changed.vanished.any()
-
-
 @pytest.mark.parametrize("moved_twice", [False, True])
 def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool) -> None:
     """The first is not seen, instead of being where the second ended; a hand that pauses alone does no harm."""
@@ -114,16 +102,6 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
     for event, T in zip(events, (goal, last), strict=True):
         assert event.found is not None
         assert np.linalg.norm(event.found.T[:3, 3] - T[:3, 3]) < 0.5e-3
-
-
-def test_a_part_that_is_carried_away_appears_and_vanishes() -> None:
-    view = RangeFinder().views[0]
-    before = range_of({"castle": STANDING}, view)
-    after = range_of({"castle": pose.at((0.0, 0.2, 0.0)) @ STANDING}, view)
-    changed = find_regions(before, after, 0.0)
-    assert ((after < before - 0.02) & ~changed.appeared).sum() < 40
-    assert ((after > before + 0.02) & ~changed.vanished).sum() < 40
-    assert not (changed.appeared & changed.vanished).any()
 
 
 @pytest.mark.parametrize("name", sorted(SOLIDS))

@@ -54,7 +54,7 @@ def test_without_contacts_nothing_is_gained_and_nothing_moved() -> None:
     seen = block_at(3, 4, 27)
     estimated = estimate(seen, seen.assembly, seen.poses)
     assert estimated.badness == 0.0
-    assert_allclose(estimated.goals, seen.poses, atol=1e-12)
+    assert_allclose(estimated.poses, seen.poses, atol=1e-12)
     assert_allclose(estimated.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
 
 
@@ -66,10 +66,10 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
         estimated = estimate(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector(compiled=False)(seen)
         assert (
-            np.abs(contact_equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max()
+            np.abs(contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
             < 5e-4
         )
-        assert_allclose(estimated.goals, corrected.poses, atol=2e-2)
+        assert_allclose(estimated.poses, corrected.poses, atol=2e-2)
 
 
 def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +10,16 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from apo_bench import InputError
-from apo_bench.cli.app import main
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_truth import read_truth
-from apo_bench.perception.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit, outliers_by_score
+from apo_bench.perception.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit
 from apo_bench.perception.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, round_split, split_of_quantiles
 from apo_bench.perception.observation.models.empirical import residuals_text
 from apo_bench.perception.observation.models.fitted import MeasuredNoise
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.models.tails import Split, Tail
-from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
+from apo_bench.perception.observation.noise_file import presets, read_noise
+from apo_bench.viz.fit_text import fit_form
 from tests import bop_made as made_of
 from tests.bop_made import Known
 
@@ -150,36 +147,6 @@ def test_parts_that_look_alike_about_an_axis_far_from_the_origin_are_no_outliers
     assert (residuals.inlier[others] == ~gross[others]).all()
 
 
-def test_outlier_rates_by_score_are_those_of_fifths(tmp_path: Path) -> None:
-    """Scores that say which fifth of estimates has 60 % outliers, and scores that say nothing."""
-    rng = np.random.default_rng(7)
-    drawn = made_of.draw(5000, Known(missed=0.0, outliers=0.0), rng)
-    score = rng.permutation(len(drawn.where)) / len(drawn.where)
-    gross = (score < 0.2) & (rng.random(len(score)) < 0.6)
-    t = drawn.t_seen + 100.0 * gross[:, None]
-    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
-    bands = outliers_by_score(
-        compared_files(made_of.results(tmp_path / "e.csv", drawn.where, drawn.R_seen, t, score), truth)
-    )
-    assert_allclose([band.least for band in bands], [0.0, 0.2, 0.4, 0.6, 0.8], atol=1e-3)
-    assert bands[0].outliers == pytest.approx(gross.sum() / 1000.0, abs=1e-9)
-    assert [band.outliers for band in bands[1:]] == [0.0] * 4
-    assert not outliers_by_score(compared_files(*made_of.files(tmp_path, drawn)))
-
-
-def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
-    drawn = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
-    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
-    with pytest.raises(InputError, match="the places that were estimated are the true ones, or nearly"):
-        fit_noise(compared_files(truth, truth), "")
-    unturned = made_of.results(tmp_path / "unturned.csv", drawn.where, drawn.R, drawn.t_seen)
-    with pytest.raises(InputError, match="the rotations that were estimated are the true ones, or nearly"):
-        fit_noise(compared_files(unturned, truth), "")
-    few = made_of.results(tmp_path / "few.csv", drawn.where[:20], drawn.R_seen[:20], drawn.t_seen[:20])
-    with pytest.raises(InputError, match="20 of 100 parts have an estimate within 50 mm and 30 deg; at least 30"):
-        fit_noise(compared_files(few, truth), "")
-
-
 @pytest.fixture(scope="module")
 def lmo(request: pytest.FixtureRequest) -> Residuals:
     return published(request, "lmo")
@@ -238,35 +205,3 @@ def test_a_fit_to_quantiles_meets_them() -> None:
     assert np.percentile(np.linalg.norm(np.random.default_rng(2).standard_normal((400_000, 3)), axis=1), 25) == (
         pytest.approx(LOWER_QUARTILE_OF_THREE, rel=0.01)
     )
-
-
-def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    drawn = made_of.draw(1000, Known(), np.random.default_rng(2))
-    estimates, truth = made_of.files(tmp_path, drawn)
-    out = tmp_path / "noise.toml"
-    picture = tmp_path / "fit.png"
-    samples = tmp_path / "residuals.csv"
-    arguments = ["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]
-    written = ["--out", str(out), "--picture", str(picture), "--residuals", str(samples), "--source", 'a "new"\none']
-    assert main([*arguments, *written, "--json"]) == 0
-    form = json.loads(capsys.readouterr().out)
-    residuals = compared_files(estimates, truth)
-    measured = fit_noise(residuals, 'a "new" one')
-    expected = fit_form(residuals, measured, goodness_of_fit(residuals, measured))
-    assert form == json.loads(json.dumps(expected))
-    command = "apo-bench noise fit --estimates estimates.csv --truth truth.csv"
-    assert out.read_text(encoding="utf-8") == noise_text(measured, (command, *fit_notes(expected)))
-    read, _ = read_noise(out)
-    assert read.source == 'a "new" one'
-    assert_allclose([*read.shift_mm.across, read.missed], [*measured.shift_mm.across, measured.missed], rtol=1e-4)
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert len(samples.read_text(encoding="utf-8").splitlines()) == 1001
-    assert main([*arguments, "--scene-id", "1"]) == 0
-    output = capsys.readouterr().out
-    assert output == "\n".join(fit_lines(expected | {"source": "estimates.csv against truth.csv"})) + "\n"
-    assert main([*arguments, "--scene-id", "2"]) == 2
-    assert "no image of scene 2 has an estimate" in capsys.readouterr().err
-    for option, name in (("--out", "noise.csv"), ("--picture", "no/fit.png"), ("--residuals", "truth.csv")):
-        assert main([*arguments, option, str(tmp_path / name)]) == 2
-        assert option in capsys.readouterr().err
-    assert truth.read_text(encoding="utf-8").startswith(made_of.HEADER)

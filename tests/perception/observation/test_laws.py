@@ -75,11 +75,11 @@ def mismatch(draws: Draws, inflation: float = 1.0) -> float:
 
 @pytest.mark.parametrize("name", STEADY)
 def test_errors_have_zero_mean_and_the_covariance_that_is_declared(name: str) -> None:
-    """Over seeds. `inflation` is what a model declares beyond what its observations state: gross outliers."""
+    """Over seeds; gross outliers, a tenth that err ten times as much, are not part of what is stated."""
     noise = make_noise(name, NOISE_LEVEL)
     draws = drawn(noise)
     assert bias(draws) < BOUND
-    assert mismatch(draws, getattr(noise, "inflation", 1.0)) < BOUND
+    assert mismatch(draws, 10.9 if name == "outliers" else 1.0) < BOUND
 
 
 @dataclass(frozen=True)
@@ -186,17 +186,3 @@ def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None
 
     assert made(1) == made(1)
     assert made(1) != made(2)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
-    human_error_scale = np.zeros((5, 6, 6))
-    human_error_scale[1, 1, 1] = 0.0029**2
-    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, human_error_scale))
-    plain, loose = (
-        observe(demonstration, make_noise(name, NOISE_LEVEL), np.random.default_rng(0))
-        for demonstration in demonstrations
-    )
-    assert_array_equal(loose.poses, plain.poses)
-    assert plain.observed[1]
-    assert_allclose(loose.covariance - plain.covariance, human_error_scale, atol=1e-17)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import InputError, observe
 from apo_bench.cli.app import main
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.plain import Plain
-from apo_bench.viz.noise_sheet import ErrorSample, find_facts, list_models, noise_sheet
+from apo_bench.viz.noise_sheet import find_facts, list_models
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -47,19 +45,6 @@ def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
     assert_array_equal(TOWER.goals, before)
 
 
-def test_a_class_made_with_a_level_may_be_plain_too() -> None:
-    class Mine:
-        def __init__(self, noise_level: NoiseLevel) -> None:
-            self.deviation_mm = 3 * noise_level.mm
-            self.deviation_deg = noise_level.deg
-
-        def __call__(self, goals: Array, rng: np.random.Generator) -> Array:
-            return goals @ pose.exp(rng.standard_normal((len(goals), 6)) * self.deviation_mm * 1e-3)
-
-    seen = observe(SHOWN, make_noise(Mine, NoiseLevel(2.0, 1.0)), np.random.default_rng(0))
-    assert_allclose(seen.covariance[0, 0, 0], 0.006**2)
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -91,21 +76,6 @@ def test_what_a_plain_function_must_not_return(returned: object, message: str) -
     assert message in str(refused.value)
 
 
-def test_a_plain_function_by_module_and_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    (tmp_path / "plain_noise_here.py").write_text(
-        "def high(goals, rng):\n    goals[:, 2, 3] += 0.002\n    return goals\n\n\n"
-        "high.deviation_mm, high.deviation_deg = 2.0, 0.5\n\n\n"
-        "def undeclared(goals, rng):\n    return goals\n"
-    )
-    monkeypatch.chdir(tmp_path)
-    assert main(["noise", "show", "plain_noise_here:high"]) == 0
-    assert "# plain_noise_here:high: " in capsys.readouterr().out
-    assert main(["noise", "show", "plain_noise_here:undeclared"]) == 2
-    output = capsys.readouterr().err
-    assert output.count("\n") == 1
-    assert "undeclared.deviation_mm" in output
-
-
 def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["noise", "list"]) == 0
     listing = capsys.readouterr().out
@@ -126,12 +96,3 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
     for line in (*about.formula, *about.parameters, about.frame, about.states, *about.notes):
         assert line in text
     assert "\nErrors at 2 mm and 2 deg, 3000 operations of stick_in_tower:\n" in text
-
-
-def test_the_table_of_a_card_is_of_errors_that_were_drawn() -> None:
-    errors = np.zeros((5, 4))
-    errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 7.0]
-    text = noise_sheet("isotropic", NOISE_LEVEL, ErrorSample(errors, np.array([3.0, 1.0, 1.0, 1.0]), 0.25))
-    across = next(line for line in text.splitlines() if line.startswith("| across"))
-    assert across.split("|")[2:5] == [f"{cell:>10} " for cell in ("3.61", "3", "2")]
-    assert "5 operations of stick_in_tower; 25.0 % were not observed" in text

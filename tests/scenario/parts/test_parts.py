@@ -37,18 +37,6 @@ VOLUME_MM3 = {
     "table": 1400 * 1200 * 20,
     "table_pockets": 1400 * 1200 * 20 - 2 * 50 * 50 * 6,
 }
-CASTLE = {  # normal, its coordinate [mm], corners, area [mm^2]
-    "px": ((1, 0, 0), 30, 8, 60 * 40 - 200),
-    "nx": ((-1, 0, 0), 30, 8, 60 * 40 - 200),
-    "py": ((0, 1, 0), 30, 4, 60 * 40),
-    "ny": ((0, -1, 0), 30, 4, 60 * 40),
-    "bottom": ((0, 0, -1), 0, 4, 60 * 60),
-    "topP": ((0, 0, 1), 40, 4, 60 * 20),
-    "topN": ((0, 0, 1), 40, 4, 60 * 20),
-    "sfl": ((0, 0, 1), 30, 4, 60 * 20),
-    "spy": ((0, -1, 0), -10, 4, 60 * 10),
-    "sny": ((0, 1, 0), -10, 4, 60 * 10),
-}
 
 
 def test_the_package_has_the_parts_of_the_toy_world_and_those_that_a_script_makes():
@@ -63,22 +51,6 @@ def test_the_faces_close_the_solid(name: str):
     assert np.abs(sum(face_area(f) * f.normal for f in faces)).max() < 1e-12
     flux = sum(face_area(f) * f.normal @ f.outline[0] for f in faces)
     assert flux / 3 == pytest.approx(1e-9 * VOLUME_MM3[name], rel=1e-9)
-
-
-@pytest.mark.parametrize("name", sorted(CASTLE))
-def test_the_faces_of_the_castle(name: str):
-    normal, distance, corners, square_mm = CASTLE[name]
-    face = load_part("castle").faces[name]
-    assert face.plane == pytest.approx((*normal, -1e-3 * distance), abs=1e-12)
-    assert len(face.outline) == corners
-    assert face_area(face) == pytest.approx(1e-6 * square_mm)
-    assert not face.fit
-
-
-def test_faces_without_a_site_are_named_by_direction_and_place():
-    first, second = (list(load_part("table").faces) for _ in range(2))
-    assert first == second
-    assert first == ["top", "auto_px_1", "auto_nx_1", "auto_py_1", "auto_ny_1", "auto_nz_1"]
 
 
 cells = st.lists(st.tuples(*[st.integers(0, 3)] * 3, *[st.integers(1, 3)] * 3), min_size=1, max_size=5)

@@ -16,7 +16,6 @@ from apo_bench.resources import folder
 from apo_bench.scenario.parts import load_part, part_names, part_path, read_part
 from apo_bench.scenario.parts.checking import check_part
 from apo_bench.scenario.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
-from apo_bench.scenario.parts.stated import _across
 
 MADE = join(
     extrude(
@@ -106,11 +105,6 @@ def test_pieces_must_be_convex_and_one(case: str, part: Path) -> None:
     assert words in refusal(part)
 
 
-def test_the_file_beside_it_must_be_there(part: Path) -> None:
-    part.with_suffix(".toml").unlink()
-    assert "the file that states the faces of a part" in refusal(part)
-
-
 def stl(triangles: np.ndarray) -> bytes:
     """A binary STL file."""
     row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
@@ -182,11 +176,3 @@ def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_pat
     mine.write_text("<mujoco/>")
     with pytest.raises(InputError):
         read_part(mine)
-
-
-def test_where_a_face_points_is_taken_across_its_axis() -> None:
-    """A middle that is stated half a thousandth off is brought across the axis, not further off."""
-    axis = np.array([0.0, 0.0, 1.0])
-    assert _across((1.0, 0.0, 5e-4), axis, "part.toml") == pytest.approx([1.0, 0.0, 0.0], abs=1e-15)
-    with pytest.raises(InputError, match="a direction across the axis is needed"):
-        _across((1.0, 0.0, 2e-3), axis, "part.toml")

@@ -1,14 +1,14 @@
-"""Triangles that lie in one plane as flat pieces of the surface, and which of them meet at a small angle."""
+"""Flat pieces of a surface: triangles in one plane, and which pieces meet at a small angle."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.importers.cad.solids.mesh import Mesh, connected
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 FEWEST_SIDES = 12
-"""Flat pieces are taken for a round face if a whole turn of it has so many, or more."""
+"""The smallest number of flat pieces in a whole turn of a round face."""
 SMOOTH_RAD = np.radians(35.0)
 """Flat pieces that meet at less may be of one free surface."""
 _SAME_RAD = 1e-3
@@ -41,11 +41,11 @@ class Facets(NamedTuple):
 
 
 def widest_of(fewest: int) -> float:
-    """Flat pieces of a round face of so many sides meet at less, by half a side more or less, [rad]."""
+    """Return the angle at which flat pieces of a round face of this many sides meet at most, [rad]."""
     return WHOLE_TURN / (fewest - 0.5)
 
 
-def facets_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
+def find_facets(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     """Cut a closed mesh into flat pieces.
 
     Args:
@@ -57,10 +57,10 @@ def facets_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     # Small angles from |n_i x n_k|, as rounding makes arccos (n_i . n_k) coarse near 1.
     angle = np.arccos(np.clip((normals[i] * normals[k]).sum(axis=1), -1.0, 1.0))
     angle = np.where(angle < 0.1, np.linalg.norm(np.cross(normals[i], normals[k]), axis=1), angle)
-    # Two triangles are of one piece if they look the same way, or nearly so and neither leaves the plane of the other.
+    # Two triangles are of one piece if they face the same way, or nearly so and neither leaves the plane of the other.
     off = np.maximum(_height(mesh, normals, i, k), _height(mesh, normals, k, i))
     flat = (angle < _SAME_RAD) | ((angle < _NEAR_RAD) & (off < FLAT * mesh.extent))
-    count, of = connected(mesh.neighbours[flat], len(mesh.triangles))
+    count, of = connected_groups(mesh.neighbours[flat], len(mesh.triangles))
     # Sums over the triangles of a piece: of n times twice the area, and of the middles, weighed by the area.
     across = np.zeros((count, 3))
     np.add.at(across, of, mesh.across)

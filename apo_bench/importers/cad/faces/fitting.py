@@ -1,4 +1,4 @@
-"""Planes, cylinders and cones fitted to flat pieces of a surface: what of it lies on them, and where they end."""
+"""Fit planes, cylinders and cones to flat pieces of a surface, and find the pieces on them and their ends."""
 
 from typing import Any, NamedTuple
 
@@ -7,14 +7,13 @@ from scipy.optimize import least_squares
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, square_to
 
 _MOST_POINTS = 400
 _TURNED = 0.09
-"""How far a flat piece may be turned from what it stands for, beside half of the angle that it spans, [rad]."""
+"""How far a flat piece may be turned from its round face, beyond half of the angle that it spans, [rad]."""
 _WIDEST = 1.6
-"""No strip of a round face is this much wider than most of them, unless all of it is near to the face."""
+"""No strip of a round face is wider than most by this factor, unless all of it is near to the face."""
 NEAR_MM = 0.02
 """Sides stand for a round face if they, and their corners, are this near to it."""
 ON_WALL = 1e-5
@@ -70,7 +69,7 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
 
-def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
+def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None:
     """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt.
 
     None: there is no start, there are too few points, or nothing fits.
@@ -80,7 +79,7 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     points = points[:: -(-len(points) // _MOST_POINTS)]
     middle = points.mean(axis=0)
     height, distance, _ = start.polar(points)
-    # The point of the axis beside the middle of the points, so that turns of the axis and the radius hardly interact.
+    # The point of the axis next to the middle of the points, so that turns of the axis and the radius hardly interact.
     at = start.point + (middle - start.point) @ start.axis * start.axis
     size = max(float(np.ptp(points, axis=0).max()), 1e-300)
     x, y = square_to(start.axis)
@@ -108,11 +107,11 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 
 
-def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
+def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
     """Which flat pieces lie on a round surface.
 
     Args:
-        among: Which ones to look at, ascending.
+        among: The pieces to measure, ascending.
 
     Returns:
         Those that do; whether it is a hole; and the angle that each spans, [rad].
@@ -140,7 +139,7 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float)
     good &= np.abs(facing) > np.cos(np.minimum(span / 2.0 + _TURNED, 1.0))
     if not good.any():
         return among[good], False, span[good]
-    # A hole if most of the area looks to the axis; what looks the other way is of another face.
+    # A hole if most of the area faces the axis; the other pieces are of another face.
     hole = bool((np.sign(facing[good]) * facets.areas[among][good]).sum() < 0.0)
     good &= (facing < 0.0) == hole
     if good.any():
@@ -155,21 +154,19 @@ def axis_of(normals: Array, cone: bool) -> Array:
     return np.asarray(np.linalg.svd(rows, full_matrices=len(rows) < 3)[2][2])
 
 
-def fitted_plane(mesh: Mesh, triangles: Any) -> Region:
+def fit_plane(mesh: Mesh, triangles: Any) -> Region:
     """The plane nearest to triangles that lie in one."""
     n = mesh.across[triangles].sum(axis=0)
-    n = _snapped(n / np.linalg.norm(n))
+    n = _snap(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
     weight = np.linalg.norm(mesh.across[triangles], axis=1)
-    return plane_region(mesh, triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
+    return plane_region(triangles, n, float(weight @ (middle @ n) / weight.sum()) * n)
 
 
-def plane_region(mesh: Mesh, triangles: Any, normal: Array, point: Array) -> Region:
+def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
     """Triangles on the plane through a point."""
-    n = _snapped(normal / np.linalg.norm(normal))
-    d = float(point @ n)
-    points = mesh.corners[np.unique(mesh.triangles[triangles])]
-    return Region("plane", triangles, float(np.abs(points @ n - d).max()), direction=n, point=d * n)
+    n = _snap(normal / np.linalg.norm(normal))
+    return Region("plane", triangles, direction=n, point=float(point @ n) * n)
 
 
 def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
@@ -178,7 +175,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     # origin, so that one file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
     slope = surface.slope * float(np.sign(axis @ surface.axis))
-    axis = _snapped(axis)
+    axis = _snap(axis)
     point = surface.point - surface.point @ axis * axis
     foot = float(surface.point @ axis)
     every = np.unique(mesh.triangles[triangles])
@@ -195,7 +192,6 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     return Region(
         "cone" if slope else "cylinder",
         triangles,
-        float(np.abs(off[on]).max(initial=0.0)),
         direction=axis,
         point=point,
         span=(low, high),
@@ -227,7 +223,7 @@ def turn_of(mesh: Mesh, triangles: Any, wall: Round) -> float:
     return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
 
 
-def _snapped(n: Array) -> Array:
+def _snap(n: Array) -> Array:
     """A direction along an axis of the frame, if it is so within rounding."""
     axis = int(np.abs(n).argmax())
     exact = np.sign(n[axis]) * np.eye(3)[axis]

@@ -1,4 +1,4 @@
-"""Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
+"""Find cylinders and cones in a mesh: they grow from smooth parts of its surface, or from single edges in them."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -7,16 +7,19 @@ import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
-from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
-from apo_bench.importers.cad.solids.mesh import Mesh, connected
+from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, facets_on, refine_round
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 _FEWEST = 3
+"""Flat pieces of a round face."""
 _MOST_WORK = 3_000_000
+"""The number of flat pieces that are measured, over all trials, in one part."""
 _MOST_FAILED = 100
+"""The number of failed trials, one after the other, in one smooth part of a surface."""
 _MOST_SEED = 100
-"""How many flat pieces are looked at, over all trials, in one part; trials in vain, one after the other, in one smooth
-part of its surface; flat pieces that a trial begins with."""
+"""The number of flat pieces with which a trial begins."""
 _SAME_BEND = 0.15
+"""Edges of one cone bend by the same angle within this share."""
 
 
 class FoundWall(NamedTuple):
@@ -33,8 +36,8 @@ class FoundWall(NamedTuple):
         return round(WHOLE_TURN / float(np.median(self.spans)))
 
 
-def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
-    """Cylinders and cones, in each smooth part of the surface: first all of it, then from edges in it."""
+def find_walls(mesh: Mesh, facets: Facets) -> list[FoundWall]:
+    """Find cylinders and cones in each smooth part of the surface: first in all of it, then from edges in it."""
     walls: list[FoundWall] = []
     work = _MOST_WORK
     for group in smooth_groups(facets, np.unique(facets.smooth)):
@@ -44,21 +47,21 @@ def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
         # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
         points = mesh.corners[np.unique(facets.along[inside])]
         axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
-        starts = ((refined(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
-        whole = _grown(mesh, facets, group, inside, starts)
+        starts = ((refine_round(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
+        whole = _grow(mesh, facets, group, inside, starts)
         work -= 2 * len(group)
         if whole is not None and len(whole.members) == len(group):
             walls.append(whole)
         else:
-            found, work = _from_edges(mesh, facets, group, inside, work)
-            walls += _together(mesh, facets, group, inside, found)
+            found, work = _grow_from_edges(mesh, facets, group, inside, work)
+            walls += _merge_walls(mesh, facets, group, inside, found)
     return walls
 
 
-def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
-    """Walls of a smooth part of the surface, the large ones with what small ones had taken of them.
+def _merge_walls(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
+    """Return the walls of a smooth part of the surface, the large ones with what small ones had taken of them.
 
-    Few sides lie on many a wall beside the true one.
+    A few sides lie on many walls, of which only one is true.
     """
     walls: list[FoundWall] = []
     left = group
@@ -67,26 +70,26 @@ def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[F
         rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
         if len(rest.members) < _FEWEST:
             continue
-        near, _, _ = on_it(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
+        near, _, _ = facets_on(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
         if len(near) > len(rest.members):
             untaken = inside & np.isin(facets.smooth, left).all(axis=1)
             start = (wall.surface, wall.surface.slope != 0.0)
-            more = _grown(mesh, facets, left, untaken, [start], int(rest.members[0]))
+            more = _grow(mesh, facets, left, untaken, [start], int(rest.members[0]))
             rest = more if more is not None and len(more.members) > len(rest.members) else rest
         walls.append(rest)
         left = np.setdiff1d(left, rest.members)
     return walls
 
 
-def _from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) -> tuple[list[FoundWall], int]:
-    """Round surfaces in part of a smooth surface, the longest edges first, and what work is left."""
+def _grow_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) -> tuple[list[FoundWall], int]:
+    """Return the walls in part of a smooth surface, from the longest edges first, and the work that is left."""
     walls = list[FoundWall]()
     taken = np.zeros(len(facets.areas), dtype=bool)
     rows = np.flatnonzero(inside)
-    around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
+    edges_around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
     for row, pieces in zip(rows.tolist(), facets.smooth[rows].tolist(), strict=True):
         for piece in pieces:
-            around.setdefault(piece, []).append(row)
+            edges_around.setdefault(piece, []).append(row)
     ends = mesh.corners[facets.along[rows]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     failed = 0
@@ -95,36 +98,35 @@ def _from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) 
             continue
         if work < 0 or failed > _MOST_FAILED:
             break
-        # A cylinder is tried before a cone, as a cone fits to every cylinder, too; a start that does not even hold the
-        # pieces that it was made of is not worth a fit.
-        best = None
+        failed += 1
+        # A cylinder is tried before a cone, which fits every cylinder too; a start that does not even hold the pieces
+        # that it was made of is not worth a fit.
         for cone in (False, True):
-            start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
-            if start is None or len(on_it(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
+            start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, edges_around, taken)
+            if start is None or len(facets_on(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
                 continue
             left = group[~taken[group]]
             untaken = inside & ~taken[facets.smooth].any(axis=1)
-            best = _grown(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
+            wall = _grow(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
             work -= 4 * len(left)
-            if best is not None:
+            if wall is not None:
+                failed = 0
+                walls.append(wall)
+                taken[wall.members] = True
                 break
-        failed += 1
-        if best is not None:
-            failed = 0
-            walls.append(best)
-            taken[best.members] = True
     return walls, work
 
 
 def _seed_cylinder(
-    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+    mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
-    """The cylinder along an edge, through the edges beside it; and the flat pieces there."""
+    """Return the cylinder along an edge, through its neighbours, and the flat pieces there."""
     a, b = mesh.corners[facets.along[row]]
     length = np.linalg.norm(b - a)
-    rows = np.array([r for f in facets.smooth[row].tolist() for r in around[f] if not taken[facets.smooth[r]].any()])
+    edges = (r for piece in facets.smooth[row].tolist() for r in edges_around[piece])
+    rows = np.array([r for r in edges if not taken[facets.smooth[r]].any()])
     near = np.unique(facets.smooth[rows])
-    # Edges of a cylinder's strips are parallel to its axis, so all ends of those beside this one lie on the cylinder.
+    # Edges of a cylinder's strips are parallel to its axis, so all ends of the neighbours lie on the cylinder.
     axis = (b - a) / max(length, 1e-300)
     ends = mesh.corners[facets.along[rows]]
     along = ends[:, 1] - ends[:, 0]
@@ -134,16 +136,16 @@ def _seed_cylinder(
 
 
 def _seed_cone(
-    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+    mesh: Mesh, facets: Facets, row: int, edges_around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
-    """The cone of the pieces that meet at one angle, one after the other; and these pieces."""
+    """Return the cone of the pieces that meet at one angle, one after the other, and these pieces."""
     # Strips of one tessellated cone meet at one angle; from the first piece outwards over edges with nearly this angle.
     angle = facets.angle[row]
     members = {int(facets.smooth[row, 0])}
     rows = set()
-    to_visit = [int(facets.smooth[row, 0])]
+    to_visit = list(members)
     while to_visit and len(members) < _MOST_SEED:
-        for r in around[to_visit.pop()]:
+        for r in edges_around[to_visit.pop()]:
             if abs(facets.angle[r] - angle) < _SAME_BEND * abs(angle) and not taken[facets.smooth[r]].any():
                 rows.add(r)
                 more = set(facets.smooth[r].tolist()) - members
@@ -153,10 +155,10 @@ def _seed_cone(
     if len(members) < 5:
         return None, near
     points = mesh.corners[np.unique(facets.along[sorted(rows)])]
-    return refined(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
+    return refine_round(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
 
 
-def _grown(
+def _grow(
     mesh: Mesh,
     facets: Facets,
     among: Any,
@@ -164,24 +166,24 @@ def _grown(
     starts: Iterable[tuple[Round | None, bool]],
     seed: int | None = None,
 ) -> FoundWall | None:
-    """The flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them.
+    """Return the flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them.
 
     Args:
         inside: Which smooth edges may be used, (s,).
         starts: Surfaces to begin with, and whether they are cones; the first one that holds is taken.
     """
-    for start, cone in starts:
-        surface = start
-        # In turns: what lies on the surface, loosely at first, and the surface nearest to that, until nothing changes.
+    for surface, cone in starts:
+        # In turns: the pieces on the surface, loosely at first, and the surface nearest to them, until nothing changes.
         count = 0
         loose = 3.0
         best = None
         for _ in range(8):
             if surface is None or not surface.radius < 50.0 * mesh.extent:
                 break
-            members, hole, spans = on_it(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
+            members, hole, spans = facets_on(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
             if seed is not None:
-                members, spans = _with_seed(facets, inside, members, spans, seed)
+                is_connected = _is_connected(facets.smooth[inside], members, seed)
+                members, spans = members[is_connected], spans[is_connected]
             if len(members) < _FEWEST:
                 best = None
                 break
@@ -193,23 +195,22 @@ def _grown(
             # Only corners of edges within the surface: those on its border may belong to a chamfer or a fillet.
             both = inside & np.isin(facets.smooth, members).all(axis=1)
             points = mesh.corners[np.unique(facets.along[both])]
-            surface = refined(surface, points, cone) if len(points) >= 6 else None
+            surface = refine_round(surface, points, cone) if len(points) >= 6 else None
         if best is not None and (not cone or abs(best.surface.slope) > 1e-3):
             return best
     return None
 
 
-def _with_seed(facets: Facets, inside: Any, members: Any, spans: Array, seed: int) -> tuple[Any, Array]:
-    """Those that hang together with a seed; none if it is not among them."""
+def _is_connected(smooth: Any, members: Any, seed: int) -> Any:
+    """Which members, ascending, are connected with a seed by pairs of flat pieces; none if it is not among them."""
     if seed not in members:
-        return members[:0], spans[:0]
-    _, group = _smoothly_connected(facets.smooth[inside], members)
-    same = group == group[np.searchsorted(members, seed)]
-    return members[same], spans[same]
+        return np.zeros(len(members), dtype=bool)
+    _, group = _smoothly_connected(smooth, members)
+    return group == group[np.searchsorted(members, seed)]
 
 
 def smooth_groups(facets: Facets, members: Any) -> list[Any]:
-    """Flat pieces that hang together smoothly, over those of the list alone."""
+    """Return groups of flat pieces that are smoothly connected, over those of the list alone."""
     if not len(members):
         return []
     count, group = _smoothly_connected(facets.smooth, members)
@@ -219,4 +220,4 @@ def smooth_groups(facets: Facets, members: Any) -> list[Any]:
 
 def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
     """How many groups members, ascending, are by the pairs among them, and the group of each."""
-    return connected(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))
+    return connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

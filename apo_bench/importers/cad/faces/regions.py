@@ -1,21 +1,17 @@
-"""The faces of a mesh: flat pieces that meet smoothly are tried as cylinders and cones, and what is left as planes.
-
-Bands of tori, spheres and free surfaces look like cylinders and cones one by one, and are none.
-"""
+"""Find the faces of a mesh: cylinders and cones that no free surface contains as bands, then planes."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN
-from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, facets_of
-from apo_bench.importers.cad.faces.fitting import fitted_plane, round_region
-from apo_bench.importers.cad.faces.growing import FoundWall, smooth_groups, walls_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
+from apo_bench.importers.cad.faces.fitting import fit_plane, round_region
+from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_groups
+from apo_bench.importers.cad.solids import Mesh, Region, square_to
 
 _LARGER = 8.0
-"""A flat piece so much larger than most of its neighbours on a free surface, slivers aside, is a plane beside it."""
+"""A flat piece that is larger by this factor than most of its neighbours on a free surface is a plane next to it."""
 _BAND = 3.0
 """Bands of one free surface differ by less than this in how wide they are and how they bend."""
 _GAP = 1.8
@@ -44,10 +40,10 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     """The faces of a closed mesh, in an order that its triangles give.
 
     Args:
-        fewest: Of the sides that a round face has in a whole turn; what has fewer is so many flat faces.
+        fewest: Sides of a whole turn of a round face; a wall with fewer sides is flat faces.
     """
-    facets = facets_of(mesh, fewest)
-    every = _without_bands(mesh, facets, walls_of(mesh, facets))
+    facets = find_facets(mesh, fewest)
+    every = _drop_bands(mesh, facets, find_walls(mesh, facets))
     walls = [wall for wall in every if wall.sides >= fewest]
     triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
     regions = [
@@ -56,8 +52,8 @@ def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
     ]
     left = _wall_of_pieces(facets, walls) < 0
     thin = facets.areas < (FLAT * mesh.extent) ** 2
-    free = _free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
-    regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
+    free = _find_free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
+    regions += [fit_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
     groups = smooth_groups(facets, np.flatnonzero(free))
     regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
     return tuple(sorted(regions, key=lambda region: int(region.triangles[0])))
@@ -71,12 +67,12 @@ def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
     return of
 
 
-def _free(facets: Facets, left: Any) -> Any:
+def _find_free(facets: Facets, left: Any) -> Any:
     """Which flat pieces belong to surfaces that are neither flat nor round."""
     pairs = facets.smooth[left[facets.smooth].all(axis=1) & (np.abs(facets.angle) < SMOOTH_RAD)]
     free = np.zeros(len(left), dtype=bool)
     free[pairs] = True
-    # Of each piece the areas beside it, ascending: what is far larger than the upper quartile is a plane.
+    # Of each piece the areas of its neighbours, ascending: a piece far larger than their upper quartile is a plane.
     owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((facets.areas[other], owner))
     pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)
@@ -84,7 +80,7 @@ def _free(facets: Facets, left: Any) -> Any:
     return free
 
 
-def _without_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
+def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
     """Without bands of tori, spheres and free surfaces, which go over into others like them at both ends."""
     of = _wall_of_pieces(facets, walls)
     bands: set[int] = set()

@@ -5,16 +5,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from apo_bench.importers.cad.solids.mesh import Mesh, connected
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
 
 
-def join_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
+def merge_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
     """The mesh with near corners as the first of them, and which of its triangles, (t,), have three corners then."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
-    _, group = connected(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
+    _, group = connected_groups(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
     first = np.unique(group, return_index=True)[1]
     triangles = group[index.ravel()][mesh.triangles]
     a, b, c = triangles.T

@@ -8,10 +8,17 @@ import manifold3d
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.importers.cad.meshes.joining import SAME_CORNER, join_corners
-from apo_bench.importers.cad.solids.bodies import body_of, mesh_of, simplify
-from apo_bench.importers.cad.solids.mesh import Mesh, connected, put_together
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
+from apo_bench.importers.cad.solids import (
+    Mesh,
+    RawSolid,
+    SolidPlace,
+    body_of,
+    concatenate_meshes,
+    connected_groups,
+    mesh_of,
+    simplify,
+)
 
 _MOST_SHELLS = 200
 _THINNEST = 1e-6
@@ -33,7 +40,7 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     Raises:
         InputError: A shell is open, or its triangles lie on each other.
     """
-    joined, _ = join_corners(mesh, SAME_CORNER * mesh.extent)
+    joined, _ = merge_corners(mesh, SAME_CORNER * mesh.extent)
     found = [shell for run in _closed_runs(joined) for shell in _shells(path, run)]
     require(found, f"{path}: the triangles make no solid; save the part as a closed mesh.")
     require(len(found) <= _MOST_SHELLS, f"{path}: the file holds {len(found)} shells; {_MOST_SHELLS} are the most.")
@@ -102,7 +109,7 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
     is_within = (common > (1.0 - _COMMON) * sizes[:, None]) & (sizes[:, None] < sizes)
     is_crossing = (common > _COMMON * np.minimum.outer(sizes, sizes)) & ~is_within & ~is_within.T
     if is_crossing.any():
-        _, group = connected(np.argwhere(is_crossing), len(shells))
+        _, group = connected_groups(np.argwhere(is_crossing), len(shells))
         united = []
         for g in np.unique(group):
             members = np.flatnonzero(group == g).tolist()
@@ -113,7 +120,7 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
     solids = []
     for k in np.flatnonzero(depth % 2 == 0).tolist():
         cavities = np.flatnonzero(is_within[:, k] & (depth == depth[k] + 1)).tolist()
-        solids.append(put_together([shells[k], *(shells[m].flip() for m in cavities)]))
+        solids.append(concatenate_meshes([shells[k], *(shells[m].flip() for m in cavities)]))
     return solids, len(shells)
 
 

@@ -1,19 +1,20 @@
 """Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, square_to
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, square_to
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300
 _MOST_DIRECTIONS = 190
 """Of a piece; of one that has more, the farthest corners are kept."""
 _INSIDE_M = 5e-8
-"""Corners so far inside of a piece are none of it."""
+"""A point deeper inside of a piece is no corner of it."""
 _THIN_MM = 0.02
 """Pieces thinner than this across are left out."""
 _ON_MM = 2e-4
@@ -23,9 +24,10 @@ _NO_PLANES = np.zeros((0, 4))
 _MOST_TRIED = 500
 _IN_PLANE = (16, 8, 4)
 """In how many directions corners of a flat face are kept first."""
-_FEWEST = 12
+_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+"""Directions in space in which corners are kept first."""
 _AT_A_TIME = 3
-LEFT_MM = 0.02
+_LEFT_MM = 0.02
 """How far off a piece with fewer corners the surface may lie where others come by."""
 
 
@@ -35,14 +37,14 @@ def corners_of(body: Any) -> Array:
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
-def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
         cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
     """
-    points = np.round(without_near(points), _DIGITS)
+    points = np.round(merge_near_points(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
     # Sides of a hull that differ by rounding are one; a corner between two such sides is then inside of the piece.
     for _ in range(4):
@@ -51,24 +53,25 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
         if not inside.any():
             break
         corners = corners[~inside]
-    return np.asarray(corners) if _is_simple(corners) else reduce_corners(corners, flats, cuts)
+    return np.asarray(corners) if _is_simple(corners) else _reduce(corners, np.concatenate([flats, cuts]))
 
 
-def reduce_corners(corners: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
-    """Return the corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
-    corners = corners[np.sort(ConvexHull(corners).vertices)]
-    if _is_simple(corners):
-        return np.asarray(corners)
+def _reduce(corners: Array, planes: Array) -> Array:
+    """The corners of a piece that has too many, of which the others leave out the least of it.
+
+    Args:
+        planes: Of flat faces and cuts, (k, 4), whose outlines are kept first.
+    """
     for many in _IN_PLANE:
-        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners))
+        kept = np.union1d(_on_flats(corners, planes, many), (corners @ _DIRECTIONS.T).argmax(axis=0))
         best = corners[kept]
         if _is_simple(best):
             break
     while _is_simple(corners[kept]):
         best = corners[kept]
-        planes = ConvexHull(best).equations
-        off = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-        if off.max() < LEFT_MM:
+        sides = ConvexHull(best).equations
+        off = (corners @ sides[:, :3].T + sides[:, 3]).max(axis=1)
+        if off.max() < _LEFT_MM:
             break
         kept = np.union1d(kept, np.argsort(-off)[:_AT_A_TIME])
     return np.asarray(best)
@@ -80,7 +83,7 @@ def _is_simple(corners: Array) -> bool:
 
 
 def _on_flats(corners: Array, flats: Array, many: int) -> Any:
-    """Those that are farthest in a flat face, in so many directions."""
+    """The farthest corners in flat faces, in some directions each."""
     kept = [np.zeros(0, dtype=np.intp)]
     turn = 2.0 * np.pi * np.arange(many) / many
     for n, d in zip(flats[:, :3], flats[:, 3], strict=True):
@@ -92,18 +95,7 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
     return np.unique(np.concatenate(kept))
 
 
-def _farthest(corners: Array) -> Any:
-    """The farthest corners in some directions in space, and along the axes of the frame."""
-    # Evenly spread directions: equal steps of height, turned by the golden angle from one to the next.
-    k = np.arange(_FEWEST) + 0.5
-    up = 1.0 - 2.0 * k / _FEWEST
-    turn = np.pi * (1.0 + 5.0**0.5) * k
-    flat = np.sqrt(1.0 - up**2)
-    way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])
-    return np.unique((corners @ way.T).argmax(axis=0))
-
-
-def without_near(points: Array) -> Array:
+def merge_near_points(points: Array) -> Array:
     """Points without those that are near to an earlier one."""
     return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
 

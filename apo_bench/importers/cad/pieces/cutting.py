@@ -9,13 +9,11 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.pieces.corners import corners_of, extremes, is_thick, without_near
+from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
 from apo_bench.importers.cad.pieces.halving import convex_parts, cut_at_shoulders, snap_to_planes
 from apo_bench.importers.cad.pieces.refining import Beside
-from apo_bench.importers.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
-from apo_bench.importers.cad.solids.bodies import body_of
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.pieces.round_walls import as_cylinders, bore_piece, least_pieces, round_shafts
+from apo_bench.importers.cad.solids import RawSolid, Region, body_of
 from apo_bench.scenario.parts.allowed import MOST_PIECES
 from apo_bench.scenario.parts.checking import touching_groups
 
@@ -64,11 +62,11 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     outlines: list[Array] = []
     beside = Beside(size, flats, None if others is None else cKDTree(others))
     for part in cut_at_shoulders(convex_parts(body, beside), shafts, size):
-        coarse = without_near(snap_to_planes(corners_of(part.body), part.planes, size))
+        coarse = merge_near_points(snap_to_planes(corners_of(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):
             continue
-        fine = with_round_shafts(coarse, shafts)
-        corners = extremes(fine, flats, part.planes)
+        fine = round_shafts(coarse, shafts)
+        corners = hull_corners(fine, flats, part.planes)
         # A hull fills hollows, and loses material where corners are left out; round walls are no loss.
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
@@ -111,7 +109,7 @@ def _bore(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> l
     """All pieces less holes; None if there are too many."""
     pieces: list[Hull] = []
     for corners in outlines if least_pieces(bores) <= MOST_PIECES else ():
-        pieces += [Hull("", 1e-3 * each) for each in bored(corners, bores, flats, MOST_PIECES - len(pieces))]
+        pieces += [Hull("", 1e-3 * each) for each in bore_piece(corners, bores, flats, MOST_PIECES - len(pieces))]
         if len(pieces) > MOST_PIECES:
             return None
     return pieces or None

@@ -1,4 +1,4 @@
-"""Solids cut along planes until the parts are convex: first along flat faces, then along sides of free shapes, [mm]."""
+"""Cut a solid along planes until its parts are convex: along flat faces, then along sides of free shapes, [mm]."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -9,18 +9,17 @@ from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.pieces.refining import Beside, refine
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Region, mesh_of
 
 _MOST_CUTS = 400
 _TRIES = 6
 HAIR = 2e-6
+"""The distance of a cut from its plane, as a share of the size."""
 _MOST_FREE_PLANES = 80
-_MOST_BISECTED = 40
-_ROUGH = 0.01
-_FINE_TRIANGLES = 4000
-"""Free shapes with more planes at reflex edges are halved instead, into so many pieces, until their hulls are so little
-larger; they need not have more triangles."""
+"""A free shape with more planes at reflex edges is halved."""
+_MOST_BISECTED = 40  # parts of a shape that is halved
+_ROUGH = 0.01  # of its volume: what hulls may fill beyond its parts
+_FINE_TRIANGLES = 4000  # of a shape that is simplified before
 
 
 def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:

@@ -13,11 +13,8 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.pieces.corners import LEFT_MM, is_thick, reduce_corners
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import square_to
+from apo_bench.importers.cad.solids import Mesh, mesh_of, square_to
 
 _DEEP_MM = 0.02
 """How deep the surface may lie in a hull where other solids come near."""
@@ -75,7 +72,7 @@ class _Fault(NamedTuple):
     """Of the allowed depth; 0 if it is less."""
     point: Array
     normals: Array
-    """Of the sides there, (k, 3), or of planes that halve a part that needs too many corners."""
+    """Of the sides there, (k, 3)."""
 
 
 def refine(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
@@ -114,13 +111,6 @@ def _worst_fault(part: CutPart, beside: Beside) -> _Fault:
     if len(share) and share.max() > 1.0:
         k = int(share.argmax())
         return _Fault(float(share[k]), points[k], _normals_at(mesh, points[k]))
-    # A sheet is left out later.
-    if beside.others is not None and not len(points) and is_thick(mesh.corners):
-        off = -depths(mesh.corners, _planes(reduce_corners(mesh.corners, beside.flats, part.planes)))
-        if beside.is_near(mesh.corners[off > LEFT_MM]).any():
-            low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
-            axis = np.eye(3)[int((high - low).argmax())]
-            return _Fault(1.0 + float(off.max()), (low + high) / 2.0, axis[None])
     return _Fault(0.0, mesh.corners[0], np.zeros((0, 3)))
 
 

@@ -14,20 +14,20 @@ from scipy.spatial import ConvexHull
 from shapely import MultiPoint, Point
 
 from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
-from apo_bench.importers.cad.pieces.corners import corners_of, extremes, is_thick, without_near
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region
+from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
-"""A gap between corners of a ring that is so much wider than most belongs to no wall."""
+"""A gap between corners of a ring that is wider than most by this factor belongs to no wall."""
 
 
 def least_pieces(bores: Sequence[Region]) -> int:
-    """How many wedges stand around round holes at least."""
+    """Return the smallest number of wedges around round holes."""
     return sum(sides_of(1e-3 * max(bore.radii)) for bore in bores)
 
 
-def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
+def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
     """A convex piece less round holes, as convex pieces; no more holes are taken out when there are too many pieces.
 
     Args:
@@ -50,8 +50,8 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> l
         if len(parts) > most:
             break
         parts = [piece for part in parts for piece in (_around(part, bore) if _meets(part, bore) else (part,))]
-    points = [without_near(corners_of(part)) for part in parts if not part.is_empty()]
-    return [extremes(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
+    points = [merge_near_points(corners_of(part)) for part in parts if not part.is_empty()]
+    return [hull_corners(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
 
 
 def _between(a: Region, b: Region) -> tuple[Array, float] | None:
@@ -106,7 +106,7 @@ def _around(part: Any, bore: Region) -> Iterator[Any]:
             yield wedge
 
 
-def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
+def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
     """A piece with as many corners on a shaft as its wall needs: new ones on whole circles, more on other ones."""
     added = []
     dropped = np.zeros(len(corners), dtype=bool)
@@ -127,7 +127,7 @@ def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
                 added.append(shaft.around(level, float(shaft.radius_at(level)), angles))
     if not added:
         return corners
-    every = without_near(np.concatenate([corners[~dropped], *added]))
+    every = merge_near_points(np.concatenate([corners[~dropped], *added]))
     return np.asarray(every[np.sort(ConvexHull(every).vertices)])
 
 
@@ -137,7 +137,7 @@ def _on_wall(corners: Array, shaft: Region) -> Any:
 
 
 def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
-    """Angles of corners that a wall of so many sides needs beside those of a ring; whether they stand for all of it."""
+    """Angles of the corners that a wall needs beyond those of a ring, and whether they stand for all of it."""
     if len(ring) < 3:
         return ring[:0], False
     gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))

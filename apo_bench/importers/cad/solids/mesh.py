@@ -77,13 +77,13 @@ class Mesh:
         return Mesh(self.corners, self.triangles[:, ::-1])
 
 
-def put_together(meshes: Sequence[Mesh]) -> Mesh:
+def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
     """Return one mesh of all triangles; meshes share no corner."""
     offsets = np.cumsum([0, *(len(mesh.corners) for mesh in meshes[:-1])])
     triangles = [mesh.triangles + offset for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.corners for mesh in meshes]), np.concatenate(triangles))
 
 
-def connected(pairs: Any, count: int) -> tuple[int, Any]:
+def connected_groups(pairs: Any, count: int) -> tuple[int, Any]:
     """Return how many groups pairs, (p, 2), make of 0 ... count - 1, and the group of each, (count,)."""
     return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)

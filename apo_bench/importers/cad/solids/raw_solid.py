@@ -49,7 +49,7 @@ def merge_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
     different: list[RawSolid] = []
     for new in solids:
         for i, old in enumerate(different):
-            T = _moved_onto(old.mesh, new.mesh)
+            T = _transform_onto(old.mesh, new.mesh)
             if T is not None:
                 more = (place._replace(T=place.T @ T) for place in new.places)
                 different[i] = replace(old, places=(*old.places, *more))
@@ -59,7 +59,7 @@ def merge_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
     return different
 
 
-def _moved_onto(a: Mesh, b: Mesh) -> Array | None:
+def _transform_onto(a: Mesh, b: Mesh) -> Array | None:
     """How the first one is moved onto the second, which has the same triangles in the same order; else None."""
     are_many = len(a.corners) == len(b.corners) and len(a.triangles) == len(b.triangles)
     if not are_many or abs(a.volume - b.volume) > 1e-4 * abs(a.volume):

@@ -29,8 +29,6 @@ class Region:
     kind: RegionKind
     triangles: Any
     """Which of the mesh, ascending."""
-    residual: float = 0.0
-    """How far its corners are from it at most, but for the sagitta of the tessellation, [mm]."""
     name: str = ""
     direction: Array = field(default_factory=lambda: np.zeros(3))
     """The outward normal of a plane, the axis of a round one."""

@@ -1,6 +1,5 @@
 """A solid of a B-rep becomes a closed mesh whose triangles belong to faces with the parameters of the file."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,9 @@ from scipy.spatial import ConvexHull
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
-from apo_bench.importers.cad.meshes.joining import SAME_CORNER, join_corners
+from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
-from apo_bench.importers.cad.solids.mesh import Mesh, connected, put_together
-from apo_bench.importers.cad.solids.naming import name_regions
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, concatenate_meshes, connected_groups, name_regions
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane, is_same_surface
 
 _LEVEL = 1e-6
@@ -38,23 +34,21 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
     neighbours = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
     pairs = [(i, k) for i, k in neighbours.tolist() if i != k and is_same_surface(faces[i], faces[k], mesh.extent)]
-    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
+    _, group = connected_groups(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
     first_of_group = [faces[int(k)] for k in np.unique(group, return_index=True)[1]]
     mesh, owner = _in_strips(mesh, group[owner], [face.surface for face in first_of_group])
     regions = []
     for g in np.unique(owner):
-        region = _region(mesh, np.flatnonzero(owner == g), first_of_group[g].surface)
-        residuals = [face.residual for face, k in zip(faces, group, strict=True) if k == g]
-        regions.append(replace(region, residual=max(region.residual, *residuals)))
+        regions.append(_region(mesh, np.flatnonzero(owner == g), first_of_group[g].surface))
     named = name_regions(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
     return RawSolid(solid.name, mesh, solid.places, repairs, named)
 
 
 def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     """The triangles of all faces with common corners, and the face of each."""
-    whole = put_together([Mesh(face.corners, face.triangles) for face in faces])
+    whole = concatenate_meshes([Mesh(face.corners, face.triangles) for face in faces])
     owner = np.repeat(np.arange(len(faces)), [len(face.triangles) for face in faces])
-    mesh, has_three = join_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
+    mesh, has_three = merge_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
     return mesh, owner[has_three]
 
 
@@ -89,7 +83,7 @@ def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
         return None
     hull = ConvexHull(points).simplices
     sides = hull[np.ptp(height[hull], axis=1) > near]
-    # They look the way that the triangles did: outwards, or towards the axis for a hole.
+    # They face as the triangles did: outwards, or towards the axis for a hole.
     across = np.cross(points[sides[:, 1]] - points[sides[:, 0]], points[sides[:, 2]] - points[sides[:, 0]])
     outward = (across * wall.polar(points[sides].mean(axis=1))[2]).sum(axis=1)
     before = (mesh.across[triangles] * wall.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))[2]).sum()
@@ -102,7 +96,7 @@ def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region
     across = mesh.across[triangles]
     if isinstance(surface, Plane):
         sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
-        return plane_region(mesh, triangles, sign * surface.normal, surface.point)
+        return plane_region(triangles, sign * surface.normal, surface.point)
     _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
     return round_region(mesh, triangles, surface, hole, turn_of(mesh, triangles, surface))

@@ -1,4 +1,4 @@
-"""Tails from published quantiles, where the estimates themselves are not published."""
+"""Fit tails to published quantiles, where the estimates themselves are not published."""
 
 from collections.abc import Mapping
 
@@ -50,6 +50,6 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
 
 
 def round_split(lower_quartile: float, limit: float) -> Split:
-    """A Gaussian alike in all directions whose length has this lower quartile: all that one number can say."""
+    """A Gaussian, the same in all directions, whose length has this lower quartile."""
     tail = Tail(lower_quartile / LOWER_QUARTILE_OF_THREE)
     return Split(tail, tail, limit)

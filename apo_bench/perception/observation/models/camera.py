@@ -1,4 +1,4 @@
-"""A camera, and errors along and across the rays on which it sees parts.
+"""A camera: the frames of the rays on which it sees parts.
 
 The camera's axes are those of OpenCV: x to the right, y down, z along the optical axis. The frame of a ray is that of
 the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).
@@ -50,25 +50,25 @@ class Camera:
         )
         object.__setattr__(self, "T_world_camera", T)
 
-    def rays(self, goals: Array) -> Array:
+    def rays(self, poses: Array) -> Array:
         """Unit vectors (n, 3) from the camera to the origin of each part, world frame; on its very place, the axis."""
-        to = goals[:, :3, 3] - self.T_world_camera[:3, 3]
+        to = poses[:, :3, 3] - self.T_world_camera[:3, 3]
         length = np.linalg.norm(to, axis=1, keepdims=True)
         return np.where(length > 0.0, to / np.where(length > 0.0, length, 1.0), self.T_world_camera[:3, 2])
 
-    def frames(self, goals: Array) -> Array:
+    def frames(self, poses: Array) -> Array:
         """The frames of the rays, (n, 3, 3), world from ray: the third column is the ray."""
         R = self.T_world_camera[:3, :3]
         # The shortest turn from z to the ray r is about k = z x r, with |k| = sin and r_z = cos: Rodrigues' formula
         # I + K + K^2 (1 - cos) / sin^2, where (1 - cos) / sin^2 = 1 / (1 + cos).
-        ray = self.rays(goals) @ R
+        ray = self.rays(poses) @ R
         K = pose.hat(np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1))
         cosine = ray[:, 2, None, None]
         behind = cosine < _BEHIND - 1.0
         shortest = np.eye(3) + K + K @ K / np.where(behind, 1.0, 1.0 + cosine)
         return np.asarray(R @ np.where(behind, np.diag([1.0, -1.0, -1.0]), shortest))
 
-    def twists(self, goals: Array, errors: Array) -> Array:
+    def twists(self, poses: Array, errors: Array) -> Array:
         """Body twists (n, 6) of errors that are given in the frames of the rays.
 
         Turn first, then shift in the frame that is seen: xi = (R_seen^t F d, R^t F w), R_seen = R exp(R^t F w). The
@@ -76,13 +76,13 @@ class Camera:
         `covariance` for that ray, since a turn leaves its own axis where it is.
 
         Args:
-            goals: (n, 4, 4), where the parts are, world frame, [m].
+            poses: (n, 4, 4), where the parts are, world frame, [m].
             errors: (n, 6), (x, y, along; rx, ry, about), [m, rad].
         """
-        frames = self.frames(goals)
-        turn = np.zeros((len(goals), 6))
-        turn[:, 3:] = np.einsum("nji,njk,nk->ni", goals[:, :3, :3], frames, errors[:, 3:])
-        R_seen = (goals @ pose.exp(turn))[:, :3, :3]
+        frames = self.frames(poses)
+        turn = np.zeros((len(poses), 6))
+        turn[:, 3:] = np.einsum("nji,njk,nk->ni", poses[:, :3, :3], frames, errors[:, 3:])
+        R_seen = (poses @ pose.exp(turn))[:, :3, :3]
         shift = np.einsum("nji,njk,nk->ni", R_seen, frames, errors[:, :3])
         return np.concatenate([shift, turn[:, 3:]], axis=1)
 

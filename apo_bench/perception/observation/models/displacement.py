@@ -1,4 +1,4 @@
-"""How displaced goals become an observation, and what that states."""
+"""Displaced poses as an observation, with the covariance that it states."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,20 +13,20 @@ COVARIANCE_FLOOR = frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
 
 
 def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Array, covariance: Array) -> Observation:
-    """Every goal seen at `T exp(xi)`; it states the covariance of xi, what carelessness adds, and at least the floor.
+    """Observe every pose at `T exp(xi)`, with the covariance of xi and of the human error, and at least the floor.
 
     Args:
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
-    goals = displace(demonstration.poses, xi)
+    poses = displace(demonstration.poses, xi)
     stated = floor_covariance(covariance + demonstration.human_error_covariance)
-    return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+    return Observation(assembly, demonstration.start, poses, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
-def displace(goals: Array, xi: Array) -> Array:
-    """`T exp(xi)` of goals (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
-    return np.where(np.any(xi, axis=1, keepdims=True)[..., None], goals @ pose.exp(xi), goals)
+def displace(poses: Array, xi: Array) -> Array:
+    """`T exp(xi)` of poses (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
+    return np.where(np.any(xi, axis=1, keepdims=True)[..., None], poses @ pose.exp(xi), poses)
 
 
 def observe_shared(
@@ -42,7 +42,7 @@ def observe_shared(
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         own: (6,), standard deviation of what of xi operations do not share, [m, rad]. Without any, operations would be
             told to agree without an error, which no camera does.
-        shared: The goals that are seen, (n, 4, 4) -> what operations share.
+        shared: The poses that are seen, (n, 4, 4) -> what operations share.
     """
     seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
     return with_shared(seen, *shared(seen.poses)) if own.any() else seen

@@ -1,4 +1,4 @@
-"""Noise that draws from the residuals of a pose estimator themselves; `noise fit --residuals` writes a file of them."""
+"""Noise that draws from the residuals of a pose estimator."""
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -58,7 +58,7 @@ class Sample:
 class Empirical:
     """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
 
-    It is taken as it is or with the opposite sign, both alike often, so that it is 0 in the mean: a bias of the
+    It is taken as it is or with the opposite sign, both equally often, so that it is 0 in the mean: a bias of the
     estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
     is not known, as the part looks alike when turned, are left out.
     """

@@ -1,4 +1,4 @@
-"""How cameras fail: some operations are seen where their part is not, with the covariance of a right pose.
+"""Noise with failures of the camera: some poses are false, with the covariance of right ones.
 
 What is false is drawn apart from the noise, so that a later look can repeat it: a model keeps no state.
 """
@@ -27,7 +27,7 @@ VIEW_SHIFT_M = 0.02
 VIEW_TURN_RAD = float(np.radians(5.0))
 """Standard deviations of the displacement of a view, along and about each axis."""
 _MOST_REPEAT = 0.999
-"""A corrector is told no more than this, which no number of looks proves."""
+"""The largest probability that is stated: no number of observations proves more."""
 
 
 class FalseViews(NamedTuple):
@@ -43,7 +43,7 @@ class Failure(NamedTuple):
     """A way in which a camera fails, and how often."""
 
     displace: Callable[[Array, Demonstration, Camera, float, np.random.Generator], None]
-    """(goals (n, 4, 4), shown, camera, rate, rng): replaces those of the goals that are false, in place."""
+    """(poses (n, 4, 4), shown, camera, rate, rng): replaces those of the poses that are false, in place."""
     title: str
     formula: str
     notes: tuple[str, ...] = ()
@@ -106,16 +106,16 @@ class CameraFailures:
         before = self.draw_false(demonstration, first)
         now = self.draw_false(demonstration, rng)
         repeated = before.false & (rng.random(len(assembly)) < self.repeat)
-        goals = np.where(repeated[:, None, None], before.poses, now.poses)
-        return self._observe(demonstration, rng, FalseViews(repeated | now.false, goals))
+        poses = np.where(repeated[:, None, None], before.poses, now.poses)
+        return self._observe(demonstration, rng, FalseViews(repeated | now.false, poses))
 
     def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
         """What a first look has wrong: the first draws of `__call__`."""
-        goals = demonstration.poses.copy()
-        if max(self.noise_level) > 0.0 and len(goals):
+        poses = demonstration.poses.copy()
+        if max(self.noise_level) > 0.0 and len(poses):
             for failure in self.failures:
-                failure.displace(goals, demonstration, self.camera, failure.rate, rng)
-        return FalseViews(np.abs(goals - demonstration.poses).max(axis=(1, 2), initial=0.0) > 0.0, goals)
+                failure.displace(poses, demonstration, self.camera, failure.rate, rng)
+        return FalseViews(np.abs(poses - demonstration.poses).max(axis=(1, 2), initial=0.0) > 0.0, poses)
 
     def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
         sigma = self.noise_level.sigma()
@@ -133,24 +133,24 @@ def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
     return [int(k) for k in np.flatnonzero(rng.random(n) < rate)]
 
 
-def _flip(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
     assembly = shown.assembly
-    for k in draw_failing(len(goals), rate, rng):
+    for k in draw_failing(len(poses), rate, rng):
         turns = approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
         if len(turns):
-            goals[k] = goals[k] @ turns[rng.integers(len(turns))]
+            poses[k] = poses[k] @ turns[rng.integers(len(turns))]
 
 
-def _leave_behind(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+def _leave_behind(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen where they were before the operation moved them."""
     before = (shown.start, *placements(shown.assembly, shown.start, shown.poses))
-    for k in draw_failing(len(goals), rate, rng):
-        goals[k] = before[k][shown.assembly.operations[k].main]
+    for k in draw_failing(len(poses), rate, rng):
+        poses[k] = before[k][shown.assembly.operations[k].main]
 
 
-def _swap(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """The views of two operations on like parts are exchanged; where no two parts are alike, of any two."""
+def _swap(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """The views of two operations on like parts are exchanged; of any two where no two parts have one shape."""
     assembly = shown.assembly
     parts = [operation.main for operation in assembly.operations]
     free = set(range(len(parts)))
@@ -161,28 +161,28 @@ def _swap(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
         like = [i for i in others if assembly.solids[parts[i]] is assembly.solids[parts[k]]] or others
         if starts and k in free and like:
             i = like[int(rng.integers(len(like)))]
-            goals[[k, i]] = shown.poses[[i, k]]
+            poses[[k, i]] = shown.poses[[i, k]]
             free -= {i, k}
 
 
-def _shift_along_ray(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+def _shift_along_ray(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen 20 to 60 mm too near or too far, on the ray of the camera."""
-    rays = camera.rays(goals)
-    for k in draw_failing(len(goals), rate, rng):
-        goals[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)
+    rays = camera.rays(poses)
+    for k in draw_failing(len(poses), rate, rng):
+        poses[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)
 
 
-def _displace_view(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+def _displace_view(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Operations one after the other, as many as the rate says and two at least, share one displacement."""
-    many = min(len(goals), max(2, round(rate * len(goals)))) if rate > 0.0 else 0
-    first = int(rng.integers(len(goals) - many + 1))
+    many = min(len(poses), max(2, round(rate * len(poses)))) if rate > 0.0 else 0
+    first = int(rng.integers(len(poses) - many + 1))
     error = rng.standard_normal(6) * np.repeat([VIEW_SHIFT_M, VIEW_TURN_RAD], 3)
     # T -> P exp(e) P^-1 T, P the axes of the camera in the middle of what is displaced.
     view = slice(first, first + many)
     if many:
         P = camera.T_world_camera.copy()
-        P[:3, 3] = goals[view, :3, 3].mean(axis=0)
-        goals[view] = P @ pose.exp(error) @ pose.inverse(P) @ goals[view]
+        P[:3, 3] = poses[view, :3, 3].mean(axis=0)
+        poses[view] = P @ pose.exp(error) @ pose.inverse(P) @ poses[view]
 
 
 PRESETS: Mapping[str, Failure] = MappingProxyType(
@@ -202,7 +202,7 @@ PRESETS: Mapping[str, Failure] = MappingProxyType(
             _swap,
             "two parts are taken for each other",
             "S the pose of another operation, which has this one's",
-            ("Operations on like parts are exchanged, of any two parts where none are alike",),
+            ("Operations on like parts are exchanged, of any two parts where none have one shape",),
             by_part=False,
         ),
         "rays": Failure(

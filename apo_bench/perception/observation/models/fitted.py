@@ -1,4 +1,4 @@
-"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers.
+"""Noise with the tails, outliers and misses that were fitted to a pose estimator.
 
 It is drawn, or stated of an observation that a camera of this noise has made.
 """
@@ -47,7 +47,7 @@ class MeasuredNoise:
     outliers: float
     """Part of those that were found, that are off by more than the limit of the shift."""
     farthest_mm: float
-    """Outliers are off by the limit to this, alike in each octave."""
+    """Outliers are off by the limit to this, equally often in each octave."""
 
 
 @final
@@ -57,7 +57,7 @@ class Fitted:
 
     Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
     changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
-    inliers; an observation does not know which of its goals are outliers, only how often there are any.
+    inliers; an observation does not know which of its poses are outliers, only how often there are any.
     """
 
     measured: MeasuredNoise
@@ -116,14 +116,14 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
     return replace(observation, covariance=stated, shared=(), tails=tails)
 
 
-def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, goals: Array) -> Tails:
+def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
     """The tails of inliers, in the frames of the rays on which parts are seen."""
     shift = measured.shift_mm
     turn = measured.turn_deg
     units = np.repeat(LEVEL_UNITS[[0, 3]] * noise_level, 2)
     each = (shift.across, shift.along, turn.across, turn.along)
     return Tails(
-        frames=np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals),
+        frames=np.swapaxes(poses[:, :3, :3], 1, 2) @ camera.frames(poses),
         scales=np.array([tail.scale for tail in each]) * units,
         freedom=np.minimum([tail.freedom for tail in each], _GAUSSIAN),
         variances=np.array([*shift.variances, *turn.variances]) * units**2,
@@ -169,16 +169,16 @@ def observe_in_ray_frames(
     stated = camera.covariance(displace(demonstration.poses, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(noise_level) > 0.0)
-    goals = seen.poses.copy()
+    poses = seen.poses.copy()
     stated = seen.covariance.copy()
-    goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
+    poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
-    return replace(seen, poses=goals, covariance=stated, observed=~missed)
+    return replace(seen, poses=poses, covariance=stated, observed=~missed)
 
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
-    # Gaussian vectors have any direction alike often, Gaussian quaternions any rotation; log-uniform sizes.
+    # Gaussian vectors have any direction equally often, Gaussian quaternions any rotation; log-uniform sizes.
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     size = measured.shift_mm.limit * (measured.farthest_mm / measured.shift_mm.limit) ** rng.random((n, 1))

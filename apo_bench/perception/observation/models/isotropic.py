@@ -1,4 +1,4 @@
-"""Noise that is the same in every direction: Gaussian, with a factor of its own for each part, or with heavy tails."""
+"""Noise that is the same in every direction: Gaussian, with a factor for each part, or with heavy tails."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ class Isotropic:
     """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
 
     Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
-    exactly zero: the goals are then those that were shown, bit for bit.
+    exactly zero: the poses are then those that were shown, bit for bit.
     """
 
     noise_level: NoiseLevel

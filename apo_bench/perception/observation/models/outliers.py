@@ -1,4 +1,4 @@
-"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+"""Noise with gross outliers and missed operations."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
@@ -26,7 +26,7 @@ class Outliers:
     """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
     What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
-    it is wrong; `inflation` says how much larger the covariance of all errors is. Shares do not depend on the level:
+    it is wrong. Shares do not depend on the level:
     the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
     """
 
@@ -55,11 +55,6 @@ class Outliers:
         ),
     )
 
-    @property
-    def inflation(self) -> float:
-        """Covariance of the errors of all that is seen, over the one that is stated."""
-        return 1.0 + self.outliers * (self.times**2 - 1.0)
-
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.noise_level.sigma()
         unit = rng.standard_normal((len(assembly), 6))
@@ -67,20 +62,20 @@ class Outliers:
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
-        goals = seen.poses.copy()
+        poses = seen.poses.copy()
         covariance = seen.covariance.copy()
-        goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
+        poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
-        return replace(seen, poses=goals, covariance=covariance, observed=~missed, outliers=stated)
+        return replace(seen, poses=poses, covariance=covariance, observed=~missed, outliers=stated)
 
 
-def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:
+def last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
     """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
     now = dict(start)
-    out = goals.copy()
+    out = poses.copy()
     for k, operation in enumerate(assembly.operations):
         if seen[k]:
-            now[operation.main] = goals[k]
+            now[operation.main] = poses[k]
         out[k] = now.get(operation.main, np.eye(4))
     return out

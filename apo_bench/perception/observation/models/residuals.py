@@ -1,4 +1,4 @@
-"""How far estimates are from the truth, in the frames of the rays on which a camera saw the parts."""
+"""Residuals of a pose estimator in the frames of the rays of its camera."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ from apo_bench.perception.observation.models.camera import Camera
 INLIER_MM = 50.0
 """An estimate that is farther off than this is of something else."""
 TURNED_DEG = 30.0
-"""An estimate that is turned more than this is of a part that looks alike when turned, or was taken the wrong way
-round; which of the two cannot be told without the symmetries of the models."""
+"""An estimate that is turned more than this is of a part that looks the same when turned, or is upside down;
+which of the two, only the symmetries of the models would show."""
 _GAP_DEG = 55.0
 _IN_GAP = 1.0 / 30.0
-"""Where a part looks alike only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
+"""Where a part looks the same only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
 than this part of all, where 14 % are if any turn about an axis is as likely."""
 _FEWEST_ALIKE = 5
 _ALIKE = 0.1
@@ -67,14 +67,14 @@ class Residuals:
 
     @cached_property
     def upright(self) -> NDArray[np.bool_]:
-        """Inliers that are not turned: all whose shift is known. A part may look alike when turned about an axis beside
-        its origin, so that even the shift of one that is turned says nothing."""
+        """Inliers that are not turned, whose shift is known: the axis of a symmetry may lie off the origin of a part,
+        so that even the shift of one that is turned says nothing."""
         return self.inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
 
     @cached_property
     def round_objects(self) -> tuple[int, ...]:
-        """Objects that look alike turned by any angle about an axis, as far as estimates tell: fewer than half of the
-        inliers are upright, and turns are everywhere."""
+        """Objects that seem to look the same turned by any angle about an axis: fewer than half of their inliers are
+        upright, and turns are everywhere."""
         parts = list[int]()
         for part in np.unique(self.where[self.inlier, 2]).tolist():
             angle = self.angle_deg[self.inlier & (self.where[:, 2] == part)]

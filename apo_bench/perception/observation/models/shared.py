@@ -1,4 +1,4 @@
-"""Errors that operations share: of the model of a part, of where the camera believes to be, and of what drifts."""
+"""Noise with errors that operations share: of a part model, of the camera pose, or of drift."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, final
@@ -45,7 +45,7 @@ class Bias:
         mains = [operation.main for operation in assembly.operations]
         xi = np.array([unit[main] for main in mains]).reshape(-1, 6) * sigma
 
-        def shared(goals: Array) -> list[SharedError]:
+        def shared(poses: Array) -> list[SharedError]:
             rows = {main: tuple(k for k, other in enumerate(mains) if other == main) for main in mains}
             return [SharedError(main, k, np.diag(sigma**2)) for main, k in rows.items()]
 
@@ -58,7 +58,7 @@ class BiasView:
     """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
 
     What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
-    the middle of the operations' goals, where its size is the level; about the camera, a degree would be 16 mm.
+    the middle of the operations' poses, where its size is the level; about the camera, a degree would be 16 mm.
     The twist by which an operation is wrong, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same
     computed from shown poses and from seen ones. What is stated is about the middle of what was seen, so that nothing
     of the truth is in it; seen from there, e has the same distribution.
@@ -70,7 +70,7 @@ class BiasView:
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error of the view, common to all parts and operations",
         formula=("T_seen_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
-        frame="P with the axes of the camera, in the middle of all goals",
+        frame="P with the axes of the camera, in the middle of all poses",
         parameters=(OWN_FACT,),
         states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, over seeds, and that operations share the first: parts far "
         "from the middle are less well placed",
@@ -84,9 +84,9 @@ class BiasView:
             return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
         view = pose.adjoint(pose.inverse(demonstration.poses) @ _view_frame(self.camera, demonstration.poses))
 
-        def shared(goals: Array) -> list[SharedError]:
-            every = tuple(range(len(goals)))
-            return [SharedError("camera", every, np.diag(sigma**2), _view_frame(self.camera, goals))]
+        def shared(poses: Array) -> list[SharedError]:
+            every = tuple(range(len(poses)))
+            return [SharedError("camera", every, np.diag(sigma**2), _view_frame(self.camera, poses))]
 
         return observe_shared(assembly, demonstration, view @ (unit * sigma) + own, OWN * sigma, shared)
 
@@ -124,7 +124,7 @@ class Correlated:
         R_seen = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
         xi[:, :3] = np.einsum("nji,nj->ni", R_seen, in_world[:, 0])
 
-        def shared(goals: Array) -> list[SharedError]:
+        def shared(poses: Array) -> list[SharedError]:
             every = tuple(range(len(assembly)))
             between = first_order(len(every), self.correlation)
             T = self.camera.T_world_camera
@@ -133,8 +133,8 @@ class Correlated:
         return observe_shared(assembly, demonstration, xi, OWN * sigma, shared)
 
 
-def _view_frame(camera: Camera, goals: Array) -> Array:
+def _view_frame(camera: Camera, poses: Array) -> Array:
     """Return the axes of a camera in the middle of poses (n, 4, 4), as (4, 4), world, [m]."""
     P = camera.T_world_camera.copy()
-    P[:3, 3] = goals[:, :3, 3].mean(axis=0)
+    P[:3, 3] = poses[:, :3, 3].mean(axis=0)
     return P

@@ -1,4 +1,4 @@
-"""Errors across a ray and along it: independent Student t, and none larger than a limit.
+"""The distribution of errors across a ray and along it: independent Student t, within a limit.
 
 Across there are two directions alike, along there is one. The same form serves for shifts [mm] and for turns [deg]
 (about axes across the ray, and about the ray). All integrals over the limited region are taken along the ray, by Gauss
@@ -91,7 +91,7 @@ class Split:
         return x, top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x)), end
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
-        """Errors (n, 3); what falls outside the limit is drawn anew."""
+        """Errors (n, 3); what falls outside the limit is drawn again."""
         kept = np.zeros((0, 3))
         while len(kept) < n:
             # Student t is a Gaussian over sqrt(chi-square(n) / n): one divisor for both directions across, one along.

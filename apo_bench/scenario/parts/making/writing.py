@@ -1,4 +1,4 @@
-"""Bodies that were built become solids, and part files that are read as these solids again."""
+"""Write bodies as part files."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -108,8 +108,8 @@ def write_part(
     boxes = all_boxes(solid.pieces)
     matter = {"density": f"{density:g}", "friction": _words(friction)} if boxes else {}
     root = _tree(solid, {**matter, "rgba": _words((*color, 1.0))})
-    said = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
-    note = f"<!-- {said} -->\n" if boxes else ""
+    origin = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
+    note = f"<!-- {origin} -->\n" if boxes else ""
     indent(root)
     write_file(path, note + tostring(root, encoding="unicode") + "\n")
     if not boxes:
