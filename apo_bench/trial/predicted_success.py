@@ -110,11 +110,6 @@ def predict_success(
     return float(np.interp(score, SCORES, RATES))
 
 
-def predicted_success_sentence(predicted_success: float) -> str:
-    """`success with probability 0.93`."""
-    return f"success with probability {predicted_success:.2f}"
-
-
 def abstain(predicted_success: float, least: float) -> Outcome:
     """The ending of a trial whose plan has a lower predicted success than the least that is required."""
     # as many digits as tell the two apart: 0.947, where 0.95 is required
