@@ -12,7 +12,7 @@ _THINNEST_MM = 0.05
 
 
 def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
-    """Flat and round faces of the regions that have names; those that cannot be stated, with the reason."""
+    """Return flat and round faces of the regions that have names; those that cannot be stated, with the reason."""
     flats: list[Face] = []
     rounds: list[RoundFace] = []
     refused: dict[str, str] = {}

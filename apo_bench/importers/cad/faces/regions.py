@@ -37,7 +37,7 @@ class _End(NamedTuple):
 
 
 def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
-    """The faces of a closed mesh, in an order that its triangles give.
+    """Return the faces of a closed mesh, in an order that its triangles give.
 
     Args:
         fewest: Sides of a whole turn of a round face; a wall with fewer sides is flat faces.

@@ -12,7 +12,7 @@ SAME_CORNER = 1e-7
 
 
 def merge_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
-    """The mesh with near corners as the first of them, and which of its triangles, (t,), have three corners then."""
+    """Merge near corners into the first of them; return the mesh, and which triangles, (t,), keep three corners."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
     _, group = connected_groups(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
     first = np.unique(group, return_index=True)[1]
