@@ -9,7 +9,7 @@ from typing import Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.kernels import Kernels, own
 from apo_bench.geometry import ADJOINTS, SERIES, Array, exp_and_jacobian
 
@@ -105,7 +105,7 @@ class DenseStep:
             return
         some = self._views(rows)
         self.T[some], self.B[some] = poses_at(self._observed[some], self._L[some], z[some])
-        e, Jt = linearised_by(self._system.only(some), self.T[some], self.B[some])
+        e, Jt = linearise_by(self._system.only(some), self.T[some], self.B[some])
         m = max(self.e.shape[1], 1)
         self.e[some] = e
         self._J[some] = np.swapaxes(Jt, 1, 2)
