@@ -1,4 +1,4 @@
-"""Everything a user may bring comes by short name, as `module:name`, or as the object itself."""
+"""Resolve a short name, `module:name`, or the object itself."""
 
 import importlib
 import sys

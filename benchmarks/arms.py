@@ -25,7 +25,7 @@ Written by `python benchmarks/arms.py` from sweeps of `benchmarks/arms.toml`, on
 Success: the finished assembly is right; clearance of 0.25 mm per side, friction grasp, `--fidelity near-contact`.
 `oracle` has the true poses; `contact` corrects poses with noise of 0, 1 and 2 mm and degrees. Half of the
 demonstrations have human error. The seeds are the same for every arm. The last lines have Wilson's 95 % intervals.
-The guide has the results of [`arm check`](../guide/arm.md#what-was-measured).
+The guide has the results of [`arm check`](../guide/arm.md#measurements).
 """
 
 

@@ -230,7 +230,7 @@ def page() -> str:
         explained = {t: set(keys) for t, keys in tables.items()}
         known = {t: set(k[1]) for t, k in found[file].items()}
         if explained != known:
-            raise ValueError(f"docs/file_keys.py, {file}: it explains {explained}, the package reads {known}; make both equal.")
+            raise ValueError(f"docs/file_keys.py explains {explained} of {file}, but the package reads {known}.")
         lines += ["", f"## {file}"]
         for table, keys in tables.items():
             needed = found[file][table][0]

@@ -27,14 +27,14 @@ def assembly_import(
         ),
     ],
     *,
-    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder beside it.")],
+    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder next to it.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the files: mm, in, m, cm, ft or um; default: as they state.")
     ] = None,
     up: Up = None,
     fixed: Fixed = None,
     order: Order = None,
-    clearance_mm: ClearanceMm = None,
+    clearance_mm: ClearanceMm = 0.25,
     max_overlap_mm: MaxOverlapMm = 0.2,
     overwrite: Overwrite = False,
 ) -> None:

@@ -42,8 +42,8 @@ def detect_contacts_command(
     from apo_bench.formats.deviations import assumed_deviations
     from apo_bench.trial.detected_contacts import detect_by
     from apo_bench.trial.request import load_or_draw_observation
-    from apo_bench.viz.detection_text import detection_form, evidence_table
-    from apo_bench.viz.form_text import fact_lines
+    from apo_bench.viz.detection_text import CONTACT_COLUMNS, detection_form
+    from apo_bench.viz.form_text import fact_lines, form_table
 
     require_known("contact source", contact_source, DETECTED)
     with redirect_output(as_json):
@@ -52,7 +52,7 @@ def detect_contacts_command(
     if as_json:
         print_json(form)
         return
-    print_table(evidence_table(form), 140)
+    print_table(form_table(form["contacts"], CONTACT_COLUMNS), 140)
     typer.echo()
     print_columns(fact_lines(form, ("schema", "contacts")))
     if assumed:

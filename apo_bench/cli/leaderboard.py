@@ -11,7 +11,7 @@ from apo_bench.io import brief, clean
 
 def leaderboard_command(
     folder: Annotated[Path, path_argument("FOLDER", "Folder of entries: .json files.")],
-    out: Annotated[Path, path_option("Write the page: .md; its figure is beside it.")],
+    out: Annotated[Path, path_option("Write the page: .md; its figure is next to it.")],
     secret_seed: Annotated[
         list[str] | None,
         typer.Option(help="Hash of a secret seed of yours: mark its entries as verified; may be repeated."),

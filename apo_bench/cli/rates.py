@@ -1,17 +1,15 @@
 """Tables of a sweep on the terminal."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import typer
 from rich.table import Table as TerminalTable
 
-from apo_bench.benchmark.analysis import ConditionResult, confusions
+from apo_bench.benchmark.analysis import ConditionResult
 from apo_bench.benchmark.report.tables.conditions import condition_table
-from apo_bench.benchmark.report.tables.methods import prediction_summary
 from apo_bench.benchmark.report.tables.table import Table
 from apo_bench.cli.shared import print_table
 from apo_bench.io import clean
-from apo_bench.records import TrialRecord
 
 
 def print_report_table(table: Table) -> None:
@@ -29,8 +27,3 @@ def print_rates(cells: Sequence[ConditionResult]) -> None:
     print_report_table(condition_table(cells))
     if excluded := sum(cell.excluded for cell in cells):
         typer.echo(f"Trials that do not count, because the demonstration itself failed: {excluded:,}.")
-
-
-def print_prediction(records: Iterable[TrialRecord]) -> None:
-    """Print in one line how often plans predicted what happened."""
-    typer.echo(prediction_summary(confusions(records)[-1]))

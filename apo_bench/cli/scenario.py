@@ -36,10 +36,7 @@ Fixed = Annotated[
     typer.Option(help="Part that never moves; may be repeated; default: the largest of the lowest parts."),
 ]
 Order = Annotated[str | None, typer.Option(help="Order of the parts, with commas; default: an order that works.")]
-ClearanceMm = Annotated[
-    float | None,
-    typer.Option(min=0.0, max=5.0, help="Clearance per side of faces that fit, mm; default: 0.25."),
-]
+ClearanceMm = Annotated[float, typer.Option(min=0.0, max=5.0, help="Clearance per side of faces that fit, mm.")]
 MaxOverlapMm = Annotated[
     float,
     typer.Option(min=0.0, max=1.0, help="Add the clearance where parts overlap by up to this depth, mm; 0: nowhere."),
@@ -81,7 +78,7 @@ def scenario_show(scenario: ScenarioArgument) -> None:
 def scenario_new(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="PART", help="Part files; default: as named in --poses, beside it."),
+        typer.Argument(metavar="PART", help="Part files; default: as named in --poses, next to it."),
     ] = None,
     *,
     poses: Annotated[Path, path_option("File of [[pose]]: the final pose of every part.")],
@@ -89,7 +86,7 @@ def scenario_new(
     up: Up = None,
     fixed: Fixed = None,
     order: Order = None,
-    clearance_mm: ClearanceMm = None,
+    clearance_mm: ClearanceMm = 0.25,
     max_overlap_mm: MaxOverlapMm = 0.2,
     overwrite: Overwrite = False,
 ) -> None:
@@ -108,7 +105,7 @@ def write_new_scenario(
     parts: list[str],
     source: str,
     out: Path,
-    choices: tuple[str | None, list[str] | None, str | None, float | None, float],
+    choices: tuple[str | None, list[str] | None, str | None, float, float],
 ) -> None:
     """Choose what poses leave open, and write the scenario file.
 
@@ -118,13 +115,12 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.posed import UPS, read_posed
-    from apo_bench.importers.assembly.upright import USUAL_MM, new_upright_scenario
+    from apo_bench.importers.assembly.upright import new_upright_scenario
     from apo_bench.importers.assembly.writing import choice_lines, write_scenario
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     require(up is None or up in UPS, f"--up must be one of {', '.join(UPS)}, got {up}.")
     names = [name.strip() for name in order.split(",")] if order else []
-    clearance_mm = USUAL_MM if clearance_mm is None else clearance_mm
     made = new_upright_scenario(read_posed(poses, parts), up, fixed or (), clearance_mm, max_overlap_mm, names)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
     typer.echo("\n".join(choice_lines(made)))

@@ -35,7 +35,7 @@ def score_command(
     track: Annotated[
         list[str] | None, typer.Option(help="Track by name or file; may be repeated; default: all tracks.")
     ] = None,
-    out: Annotated[Path | None, path_option("Write the entry: .json; its records are in a folder beside it.")] = None,
+    out: Annotated[Path | None, path_option("Write the entry: .json; its records are in a folder next to it.")] = None,
     command: Annotated[
         str | None,
         typer.Option(metavar="PROGRAM", help="Program that reads a request, one line of JSON, and answers."),

@@ -63,8 +63,9 @@ def sweep_command(
       apo-bench sweep mine.toml --out runs/mine --trials 100
     """
     from apo_bench import run_sweep
-    from apo_bench.benchmark.analysis import tally
-    from apo_bench.cli.rates import print_prediction, print_rates
+    from apo_bench.benchmark.analysis import confusions, tally
+    from apo_bench.benchmark.report.tables.methods import prediction_summary
+    from apo_bench.cli.rates import print_rates
 
     options |= {"trials": trials, "seed": seed}
     records = run_sweep(
@@ -78,7 +79,7 @@ def sweep_command(
         secret_seed_file=secret_seed_file,
     )
     print_rates(tally(records))
-    print_prediction(records)
+    typer.echo(prediction_summary(confusions(records)[-1]))
     typer.echo(f"{len(records)} records in {out / 'trials.jsonl'}; report: apo-bench report {shlex.quote(str(out))}")
 
 

@@ -1,1 +1,1 @@
-"""The file forms of observations and plans."""
+"""File formats of observations and plans."""

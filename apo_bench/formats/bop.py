@@ -1,4 +1,4 @@
-"""Pose estimates in the results format of the BOP benchmark, read line by line: mm, model to camera.
+"""Pose estimates in the results format of the BOP benchmark.
 
 The first line is `scene_id,im_id,obj_id,score,R,t,time`; R is nine numbers row by row and t three, with spaces between.
 """

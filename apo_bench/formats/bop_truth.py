@@ -1,4 +1,4 @@
-"""Where parts truly were in images: a results file that holds the truth, or the `scene_gt.json` of the BOP format."""
+"""Ground truth of pose estimates: a results file, or `scene_gt.json` of the BOP format."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Observed poses as comma-separated values: one row per operation, columns known by their names.
+"""Observed poses as comma-separated values.
 
     operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz,deviation_mm,deviation_deg,seen
 

@@ -1,4 +1,4 @@
-"""Which standard deviations an observation may state, and which are assumed where it states none."""
+"""Standard deviations that an observation may state, and those that are assumed."""
 
 from math import pi
 

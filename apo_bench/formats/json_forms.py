@@ -1,4 +1,4 @@
-"""What the JSON forms of observations and plans have in common: poses and covariances, in mm and degrees.
+"""Poses and covariances in JSON, in mm and degrees.
 
 A pose is `position_mm` [x, y, z] and `quaternion_wxyz` [w, x, y, z] in the world frame. Operations are numbered from 1.
 A covariance is that of the body twist (x, y, z, rx, ry, rz) in mm and degrees.

@@ -1,4 +1,4 @@
-"""The JSON form of an observation: versioned, the same in files, in requests to programs, and on the command line.
+"""The JSON form of an observation.
 
 A file names its scenario, which carries the topology; the file itself carries numbers only.
 """

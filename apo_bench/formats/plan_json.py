@@ -1,4 +1,4 @@
-"""The JSON form of a plan: versioned, with the target pose of every operation and the steps of its schedule."""
+"""The JSON form of a plan."""
 
 from typing import Any
 

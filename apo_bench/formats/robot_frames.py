@@ -1,4 +1,4 @@
-"""ROBOT.toml: in which frames, and in which order of quaternions, a plan goes out to a robot."""
+"""ROBOT.toml: frames and quaternions in which a plan goes out to a robot."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -45,7 +45,7 @@ def import_assembly(
     up: str | None = None,
     fixed: Sequence[str] = (),
     order: Sequence[str] = (),
-    clearance_mm: float | None = None,
+    clearance_mm: float = 0.25,
     max_overlap_mm: float = 0.2,
 ) -> Scenario:
     """Make a scenario from CAD files: parts, contacts, an order, starts and grasps.
@@ -58,7 +58,7 @@ def import_assembly(
         up: The axis of the files that is up: x, y, z, -x, -y or -z. Default: z, or one that has an order.
         fixed: Parts that stay where they are. Default: the largest of the lowest.
         order: The moved parts in their order. Default: one that is found.
-        clearance_mm: Clearance per side between parts that fit. Default: what their faces leave.
+        clearance_mm: Clearance per side between parts that fit.
         max_overlap_mm: Largest depth to which parts may overlap in the files.
 
     Returns:
@@ -70,7 +70,7 @@ def import_assembly(
     """
     from apo_bench.importers.assembly.from_cad import import_assembly as write_parts
     from apo_bench.importers.assembly.posed import read_posed
-    from apo_bench.importers.assembly.upright import USUAL_MM, new_upright_scenario
+    from apo_bench.importers.assembly.upright import new_upright_scenario
     from apo_bench.importers.assembly.writing import write_scenario
 
     sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
@@ -79,8 +79,7 @@ def import_assembly(
     require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
     require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
     poses, _ = write_parts(sources, target.with_name(f"{target.stem}_parts"), unit)
-    usual = USUAL_MM if clearance_mm is None else clearance_mm
-    made = new_upright_scenario(read_posed(poses, []), up, tuple(fixed), usual, max_overlap_mm, list(order))
+    made = new_upright_scenario(read_posed(poses, []), up, tuple(fixed), clearance_mm, max_overlap_mm, list(order))
     write_scenario(made, target, f"Assembly of {target.stem}", ", ".join(source.name for source in sources))
     return load_scenario(target)
 

@@ -1,4 +1,4 @@
-"""Tables of comma-separated values, whose columns are known by their names and carry their unit in it."""
+"""Tables of comma-separated values."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""TOML and JSON files as msgspec types; what does not fit is one sentence that names the file and the key."""
+"""TOML and JSON files as msgspec types."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Draw and save figures of matplotlib that no `matplotlibrc` in the current folder or at home changes."""
+"""Figures of matplotlib with its default settings."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""The files that an MJCF file is made of: itself, what it includes, and the meshes and pictures that it names."""
+"""The files that an MJCF file is made of."""
 
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath

@@ -1,4 +1,4 @@
-"""Write a table as Parquet, where the package pyarrow is installed."""
+"""Write a table as Parquet with pyarrow."""
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec

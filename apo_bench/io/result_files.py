@@ -1,4 +1,4 @@
-"""Every result file is written here: to a hidden file in the same folder, which then takes the place of the old one.
+"""Write result files, whole or not at all.
 
 A write that fails leaves the old file as it was, and nothing is written through a symbolic link. The exception is the
 records of a sweep, which are appended line by line (`open_to_append`).

@@ -1,4 +1,4 @@
-"""Read ordinary files, none larger than allowed, and text in UTF-8; pipes and devices are not waited for."""
+"""Read ordinary files up to a limit of size."""
 
 import os
 import stat

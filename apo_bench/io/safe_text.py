@@ -1,4 +1,4 @@
-"""Text from anywhere for a terminal or for Markdown: it is shown and not obeyed."""
+"""Text from anywhere, safe for a terminal and for Markdown."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Standard streams of a command: what can be printed, and where to."""
+"""Standard streams of a command."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""Words, lists of words and columns that texts for people are made of."""
+"""Words, lists and columns for texts."""
 
 from collections.abc import Iterable, Sequence
 

@@ -1,4 +1,4 @@
-"""Documents as TOML text, which Python reads and does not write."""
+"""Documents as TOML text."""
 
 import json
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Scenarios: a file becomes a checked one, a seed lays it out."""
+"""Scenarios: files, checks and layouts."""
 
 from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import is_named, load_scenario, scenario_names, scenario_path

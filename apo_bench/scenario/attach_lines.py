@@ -1,4 +1,4 @@
-"""The operations of a scenario at its nominal goals, with the line on which each part comes there."""
+"""Lines on which parts come to their nominal poses."""
 
 from collections.abc import Sequence
 from dataclasses import replace

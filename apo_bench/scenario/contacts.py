@@ -1,4 +1,4 @@
-"""The contacts of an operation in a scenario file: faces on faces, and the gaps between them.
+"""The contacts of an operation in a scenario file, and the gaps between their faces.
 
 A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a table that says more:
 

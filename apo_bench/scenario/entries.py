@@ -1,4 +1,4 @@
-"""The tables [parts] and [[operations]] of a scenario file become parts and operations."""
+"""Parts and operations out of the tables of a scenario file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

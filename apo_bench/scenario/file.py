@@ -1,4 +1,4 @@
-"""Load a scenario: a TOML file becomes a checked `Scenario`.
+"""Load scenarios by name or from a TOML file.
 
 Lengths in mm, angles in degrees, operations numbered from 1; the file of the scenario `stick_in_tower` shows every key.
 """

@@ -1,4 +1,4 @@
-"""Where a gripper from above holds the part of an operation: as the file says, or where its shape offers a place."""
+"""Grasps of parts: as a scenario file states them, or where the shape of a part offers one."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Spread of a human error: a part that is put against a displaced one is displaced as well."""
+"""The spread of a human error to parts that are put against a displaced one."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes."""
+"""Layouts: the true poses of a trial, drawn from a seed."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

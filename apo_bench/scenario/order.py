@@ -1,4 +1,4 @@
-"""Checks that operations follow from each other: parts start on something, and none is left in the air."""
+"""Checks that operations follow from each other."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Checks that shafts have play in their holes, by their sizes or by the clearance."""
+"""Checks that shafts have play in their holes."""
 
 from apo_bench.assembly import Assembly, contact_kind, geometric_play, play_mm
 from apo_bench.errors import require

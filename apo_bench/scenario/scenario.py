@@ -1,4 +1,4 @@
-"""A scenario: one demonstration as a recipe. Files are read by `apo_bench.scenario.file`."""
+"""A scenario: one demonstration as a recipe."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

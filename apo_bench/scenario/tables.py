@@ -1,4 +1,4 @@
-"""The tables of a scenario file: which keys each may have, and which values."""
+"""The tables of a scenario file, with their keys and values."""
 
 from dataclasses import fields
 from typing import Annotated, Any, Literal

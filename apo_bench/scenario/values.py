@@ -1,4 +1,4 @@
-"""What a value in a scenario file may be: poses, axes, spans."""
+"""Values in a scenario file: poses, axes, spans."""
 
 from typing import Annotated
 

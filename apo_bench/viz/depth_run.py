@@ -1,4 +1,4 @@
-"""One demonstration through the depth camera, and the poses that it estimates, as a table and as one JSON object."""
+"""One demonstration through the depth camera, and the poses that it estimates, as one JSON object."""
 
 from typing import Any, NamedTuple
 
@@ -19,10 +19,9 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     stream,
 )
-from apo_bench.viz.form_text import form_table
 
 _SCHEMA = "apo-bench/depth/1"
-_COLUMNS = {
+DEPTH_COLUMNS = {
     "operation": "d",
     "moves": "",
     "found": "",
@@ -33,6 +32,7 @@ _COLUMNS = {
     "deviation_deg": ".2f",
     "explained": ".0%",
 }
+"""Columns of the operations of `depth_form`, with their formats."""
 
 
 class DepthRun(NamedTuple):
@@ -103,8 +103,3 @@ def _estimate_form(event: Any, run: DepthRun, k: int) -> dict[str, Any]:
         "error_mm": float(1e3 * np.linalg.norm(error[:3])),
         "error_deg": float(np.degrees(np.linalg.norm(error[3:]))),
     }
-
-
-def depth_table(form: dict[str, Any]) -> Any:
-    """The operations of `depth_form` as a table of `rich`."""
-    return form_table(form["operations"], _COLUMNS)

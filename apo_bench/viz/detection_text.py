@@ -1,4 +1,4 @@
-"""Detected contacts as a table, as sentences, and as one JSON object."""
+"""Detected contacts as one JSON object."""
 
 from math import degrees
 from typing import Any
@@ -6,10 +6,9 @@ from typing import Any
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.perception.detection.evidence import DetectedContacts
 from apo_bench.trial.detected_contacts import count_contacts
-from apo_bench.viz.form_text import form_table
 
 _SCHEMA = "apo-bench/detected-contacts/1"
-_COLUMNS = {
+CONTACT_COLUMNS = {
     "operation": "d",
     "manipulated": "",
     "environment": "",
@@ -21,11 +20,7 @@ _COLUMNS = {
     "overlap": ".0%",
     "in_scenario": "",
 }
-
-
-def evidence_table(form: dict[str, Any]) -> Any:
-    """A table of `rich` with a line for each contact of `detection_form`: measured and allowed values."""
-    return form_table(form["contacts"], _COLUMNS)
+"""Columns of the contacts of `detection_form`, with their formats."""
 
 
 def detection_form(

@@ -89,7 +89,7 @@ def _draw_arrow(axes: Any, upper: Place, lower: Place, color: str, style: Any, l
     bend = _BEND if y - v > _ROW_IN else 0.0
     look = {"arrowstyle": "-|>", "color": color, "linestyle": style, "connectionstyle": f"arc3,rad={bend}"}
     axes.annotate("", (u, v), (x, y), arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=1)
-    # the arc is a parabola: at a share s of its way it is 2 s (1 - s) rad of its length beside the straight line
+    # the arc is a parabola: at a share s of its way it is 2 s (1 - s) rad of its length away from the straight line
     s = _LABEL_AT
     aside = 2 * s * (1 - s) * bend
     at = (x + s * (u - x) - aside * (y - v), y + s * (v - y) - aside * (u - x))

@@ -40,8 +40,8 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
         InputError: An unknown sensor.
     """
     noise = ft_noise(sensor)
-    felt = filtered_noise(noise, low_pass_part())
-    guard = touch_guard(felt.force_n)
+    filtered = filtered_noise(noise, low_pass_part())
+    guard = touch_guard(filtered.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
     return {
         "sensor": {"name": sensor, "noise_n": noise.force_n, "noise_nm": noise.torque_nm},
@@ -76,7 +76,7 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, PROBING_ACTIONS)],
+        "steps": [_step(move, scene, frames, filtered) for move in moves(plan, scene, True, PROBING_ACTIONS)],
     }
 
 
@@ -90,7 +90,7 @@ def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
     }
 
 
-def _step(move: Move, scene: Scene, frames: RobotFrames, felt: FtNoise) -> dict[str, Any]:
+def _step(move: Move, scene: Scene, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any]:
     t = move.transfer
     first = t.grips[0]
     return {
@@ -99,7 +99,7 @@ def _step(move: Move, scene: Scene, frames: RobotFrames, felt: FtNoise) -> dict[
         "part": t.part,
         "square": [_grip(grip, t.T_world_start, scene, frames) for grip in t.squaring],
         "grasp_twice": _grip(first, t.T_world_start, scene, frames),
-        "lay_flat": None if t.flat is None else _laid(t, frames, felt),
+        "lay_flat": None if t.flat is None else _laid(t, frames, filtered),
         "guards_n": {"down": round(t.place_n, 6), "insert": round(t.insert_n, 6), "slide": round(t.slide_n, 6)},
         "search_press_n": None if t.front is None else round(t.slide_n, 6),
     }
@@ -114,9 +114,9 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
     }
 
 
-def _laid(t: Transfer, frames: RobotFrames, felt: FtNoise) -> dict[str, Any] | None:
+def _laid(t: Transfer, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any] | None:
     """None where the sensor could not tell lying."""
-    averaged = lay_flat.averaged_s(t.flat, felt)
+    averaged = lay_flat.averaged_s(t.flat, filtered)
     if averaged > lay_flat.LONGEST_S:
         return None
     grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out

@@ -1,6 +1,7 @@
 """The task sheet of a scenario, in Markdown: everything in it is read from the scenario."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import listed_words
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
+from apo_bench.viz.form_text import format_value
 
 
 def task_sheet(scenario: Scenario, level: int = 1) -> str:
@@ -74,35 +76,21 @@ def _describe_variations(scenario: Scenario) -> Iterator[str]:
         yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_through(turn)}."
 
 
-def _describe_success(scenario: Scenario) -> Iterator[str]:
-    t = scenario.thresholds
-    clearance = scenario.clearance_mm
-    if scenario.success:
-        yield scenario.success
-    yield (
-        f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
-        f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
-        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
-        f"another; no parts that touch slid against each other by more than {t.displaced_mm:g} mm; all parts released "
-        f"and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
-    )
-    if wider := sorted(_list_wider(scenario)):
-        limits = "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in wider)
-        yield f"Some faces have more play, so they may be farther apart: {limits}."
-    if any(scenario.assembly.is_round(relation.contact) for relation in scenario.assembly.relations()):
-        yield (
-            "Of round faces the axes count, at both ends of their common length, which is their overlap; a hole that "
-            "is wider than its shaft allows that much more. A part of revolution may end at any turn about its axis."
-        )
-    if removed := sorted(fixtures(scenario.assembly)):
-        yield f"{listed_words(removed)} may end anywhere: it is a fixture, used and removed."
-    only = "" if scenario.success_means == "assembled" else " Here only that is a success."
-    yield (
-        "As demonstrated: the same, and every contact also when it was made, where it was demonstrated; no corner of a "
-        f"part in place moved by more than {t.displaced_mm:g} mm.{only}"
-    )
-    yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
-    yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."
+def _describe_success(scenario: Scenario) -> list[str]:
+    """What is particular to the scenario; the page on the judge explains the thresholds."""
+    thresholds = format_value(asdict(scenario.thresholds))
+    margin_mm = scenario.thresholds.fit_margin_mm
+    away = sorted(fixtures(scenario.assembly))
+    wider = "; ".join(f"{contact} by {play + margin_mm:.2f} mm" for contact, play in sorted(_list_wider(scenario)))
+    facts = {
+        scenario.success: scenario.success,
+        f"Success means: {scenario.success_means.replace('_', ' ')}.": True,
+        f"Thresholds, at {scenario.clearance_mm:g} mm clearance per side: {thresholds}.": True,
+        f"Some faces have more play, so they may be farther apart: {wider}.": wider,
+        f"Fixtures, which may end anywhere: {listed_words(away)}.": away,
+        f"Contact equations count as solved below {scenario.gap_mm:g} mm.": True,
+    }
+    return [sentence for sentence, holds in facts.items() if holds]
 
 
 def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:

@@ -1,4 +1,4 @@
-"""Model files of arms that other people wrote: what is read, and one sentence for what no arm has."""
+"""Model files of arms that other people wrote: what is read, and what is refused."""
 
 from pathlib import Path
 

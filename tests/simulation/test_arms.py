@@ -126,7 +126,7 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\nhand = "linkage_gripper
         (GOOD, "the key 'gripper' is missing"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+def test_an_error_in_an_arm_file_is_refused_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "arm.toml"
     path.write_text(text.replace("ARMS", str(ARMS)))
     with pytest.raises(InputError, match=words) as found:
@@ -134,7 +134,7 @@ def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: s
     assert "\n" not in str(found.value)
 
 
-def test_arm_check_says_in_numbers_what_the_arm_can_do() -> None:
+def test_the_arm_check_measures_what_the_arm_can_do() -> None:
     """Of the arm with a linkage: all three layouts are reached, its tip keeps within half of the clearance."""
     report = check_arm(find_arm("ur5e_primitive"), load_scenario("block_on_block"), layouts=3)
     assert report.layouts_reached == 3
@@ -168,7 +168,7 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
         find_arm("menagerie:universal_robots_ur5e")
 
 
-def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> None:
+def test_an_arm_goes_around_its_base_where_the_straight_line_passes_over_it() -> None:
     arm = find_arm("ur5e_primitive")
     kinematics = Kinematics(arm)
     base = np.array(arm.base)
@@ -176,8 +176,8 @@ def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> N
     q = kinematics.inverse(ends[0], np.array(arm.home) + np.array([-1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert q is not None
     assert follow_waypoints(kinematics, ends[0], ends[1:], q) is None
-    middle, end = way = plan_waypoints(kinematics, arm, ends[0], ends[1], q)
-    assert follow_waypoints(kinematics, ends[0], way, q) is not None
+    middle, end = waypoints = plan_waypoints(kinematics, arm, ends[0], ends[1], q)
+    assert follow_waypoints(kinematics, ends[0], waypoints, q) is not None
     np.testing.assert_array_equal(end, ends[1])
     assert middle[0, 3] - base[0] == pytest.approx(np.hypot(0.05, 0.45), rel=0.02)
     near = tip_down(base + np.array((0.3, -0.4, 0.3)), -1.0)
@@ -237,7 +237,7 @@ slides = ["left_finger", "right_finger"]
 opening_mm = 46
 actuators = ["grip"]
 """
-"""A gripper that is stated, of the arm that comes along."""
+"""The arm file of a shipped arm with a stated gripper."""
 
 
 def stated(folder: Path, *changes: tuple[str, str], model: Path = ARMS / "six_axis.xml") -> Path:
@@ -262,7 +262,7 @@ def test_the_usual_arm_is_what_its_file_states() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "words"),
     [
         ([("opening_mm = 46\n", "")], "'tip', 'slides', 'opening_mm' and 'actuators' are given together"),
         (
@@ -273,10 +273,8 @@ def test_the_usual_arm_is_what_its_file_states() -> None:
         ([("[0, 11, 52, 0, 27, 0]", "[0, 11, 52]")], "'home_deg' needs 6 numbers"),
     ],
 )
-def test_what_is_wrong_with_a_stated_gripper_is_one_sentence(
-    tmp_path: Path, changes: list[tuple[str, str]], said: str
-) -> None:
-    with pytest.raises(InputError, match=re.escape(said)):
+def test_an_error_in_a_stated_gripper_is_refused(tmp_path: Path, changes: list[tuple[str, str]], words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
         read_arm(stated(tmp_path, *changes))
 
 

@@ -1,4 +1,4 @@
-"""What the arm feels of parts that cannot move, while what rests sleeps."""
+"""Contact forces on the arm from fixed and sleeping parts."""
 
 import mujoco
 import numpy as np
@@ -64,7 +64,7 @@ def test_an_empty_hand_that_presses_on_the_wall_of_a_pocket_is_stopped() -> None
         assert 20.0 < push_on_table(scene, robot) < HARDEST_N
 
 
-def test_a_part_that_fell_asleep_is_felt_no_longer(tower: Scene) -> None:
+def test_a_sleeping_part_exerts_no_force(tower: Scene) -> None:
     """The hand lifts off between two looks, the part comes to rest, and its sensor must not keep what it felt last."""
     robot = Robot(tower, tower.scenario.start)
     with allow_sleep(tower.work, True):

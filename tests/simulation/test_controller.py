@@ -68,7 +68,7 @@ def test_a_goal_beside_its_support_is_an_outcome_of_the_plan(tower: Scene) -> No
 
 
 def test_a_part_that_is_not_where_it_should_be_is_a_lost_grasp(tower: Scene) -> None:
-    """The robot believes the start it is told; physics has the part elsewhere."""
+    """The plan states one start; physics has the part elsewhere."""
     truth = layout(tower, 2)
     plan = Plan(tower.scenario.assembly, truth.start, truth.poses)
     elsewhere = {**truth.start, "castle1": truth.start["castle1"] @ pose.at((-0.10, 0, 0))}
@@ -95,10 +95,10 @@ def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) ->
     assert worst[1] < 0.05
 
 
-def test_the_room_says_by_which_files_a_plan_goes_and_steps_are_taken_where_it_says() -> None:
+def test_the_docstring_of_the_package_names_the_files_where_physics_steps() -> None:
     folder = Path(simulation.__file__).parent
     named = re.findall(r"`([a-z_/]+\.py)`", simulation.__doc__ or "")
     assert all((folder / each).is_file() for each in named)
     stepping = {str(each.relative_to(folder)) for each in folder.rglob("*.py") if "mujoco.mj_step(" in each.read_text()}
-    assert stepping == {"robot/robot.py", "human/hands.py", "arms/rig.py", "scene/settling.py"}
+    assert stepping == {"robot/robot.py", "human/hands.py", "scene/settling.py"}
     assert stepping & set(named) == {"robot/robot.py", "human/hands.py"}

@@ -1,4 +1,4 @@
-"""Demonstrations end right, show what a careful human does to some micrometres, and hide what is mended at the end."""
+"""Demonstrations succeed, show the true poses to micrometres, and hide the adjustment at the end."""
 
 from contextlib import nullcontext
 from functools import cache
@@ -18,12 +18,12 @@ from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstratio
 
 CLEARANCE_MM = 0.25
 LEVEL_MM = 0.01
-"""How far a hand that takes care, and what physics does after it has let go, may put a part aside."""
+"""How far aside a careful hand, and physics after the release, may put a part."""
 LOW = {"pocket_table": {4: 1, 5: 1}, "carried_bridge": {3: 1, 4: 2}, "shaft_through_brackets": {1: 1}}
 """Operations, counted from 0, whose part ends some clearances low: a stick lies on the floor of its slot, and a cube
 hangs on the stick that does."""
 
-ALIKE = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}}
+SHARED_ERROR = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}}
 """Operations, counted from 0, that show the error where a part goes along with the one that is wrong."""
 
 
@@ -64,13 +64,13 @@ def test_a_careful_human_shows_the_truth(name: str):
 @pytest.mark.parametrize(
     ("name", "human_error_scale"), [("vanished_fixture", 1.0), ("pocket_table", 1.0), ("nested_bushings", 2.0)]
 )
-def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, human_error_scale: float):
+def test_a_careless_human_errs_in_the_stated_operation_and_succeeds(name: str, human_error_scale: float):
     of = shown(name, human_error_scale, 2)
     assert of.demonstration.code == "ok"
     mistake = load_scenario(name).human_error
     k = of.demonstration.assembly.operations[mistake.operation].main
     axis = of.layout.poses[mistake.operation][:2, :2] @ mistake.axis[:2]
-    erring = ALIKE.get(name, {mistake.operation})
+    erring = SHARED_ERROR.get(name, {mistake.operation})
     for operation, off in enumerate(off_mm(of)):
         if operation in erring:
             assert 1.5 * human_error_scale - LEVEL_MM < abs(off[:2] @ axis) < 4.0 * human_error_scale + LEVEL_MM
@@ -78,10 +78,10 @@ def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, hum
         else:
             assert np.abs(off[:2]).max() < LEVEL_MM
     for part in {k, "castle2"} & set(of.demonstration.final):
-        assert np.abs(end_mm(of, part)[:2]).max() < LEVEL_MM, "mended unseen"
+        assert np.abs(end_mm(of, part)[:2]).max() < LEVEL_MM, "adjusted unseen"
 
 
-def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytest.MonkeyPatch):
+def test_skipped_stretches_and_sleep_change_poses_by_micrometres(monkeypatch: pytest.MonkeyPatch):
     """Two operations carry parts that touch, and the stick falls from a hand in which it hung still."""
     quick = shown("pocket_table", 1.0, 2).demonstration
     monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
@@ -106,7 +106,7 @@ class Pictures:
         self.seen.append((float(data.time), data.qpos[self.at : self.at + 3].copy()))
 
 
-def test_who_watches_sees_a_picture_every_period_also_of_what_is_left_out():
+def test_the_observer_gets_a_picture_every_period_of_skipped_stretches_too():
     its = scene("stick_in_tower")
     layout = shown("stick_in_tower", 1.0, 2).layout
     pictures = Pictures(its.shown.qpos["stick"])

@@ -1,4 +1,4 @@
-"""Fidelity contact and shared beginnings: what may be left out, and that sharing changes nothing."""
+"""Fidelity `near-contact` skips only free motion, and cached beginnings change nothing."""
 
 import json
 from functools import cache
@@ -46,21 +46,21 @@ def row(method, fidelity, *, grasp="friction", noise_level=1.0, cache=None):
     return json.dumps(run_trial(spec, scene(grasp=grasp), simulated=shown(grasp=grasp), cache=cache))
 
 
-ASKED = [("paper-track", 1.0), ("uncorrected", 1.0), ("paper", 1.0), ("paper", 0.5), ("paper-track", 1.0)]
+RUNS = [("paper-track", 1.0), ("uncorrected", 1.0), ("paper", 1.0), ("paper", 0.5), ("paper-track", 1.0)]
 
 
 @pytest.mark.parametrize(
-    ("fidelity", "grasp", "asked"),
-    [("near-contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
+    ("fidelity", "grasp", "runs"),
+    [("near-contact", "friction", RUNS), ("full", "weld", [*RUNS[:2], RUNS[-1]])],
 )
-def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
+def test_cached_beginnings_change_no_byte(fidelity, grasp, runs):
     cache = ReplayCache()
-    shared = [row(method, fidelity, grasp=grasp, noise_level=level, cache=cache) for method, level in asked]
-    alone = [row(method, fidelity, grasp=grasp, noise_level=level) for method, level in asked[:-1]]
+    shared = [row(method, fidelity, grasp=grasp, noise_level=level, cache=cache) for method, level in runs]
+    alone = [row(method, fidelity, grasp=grasp, noise_level=level) for method, level in runs[:-1]]
     assert shared == [*alone, alone[0]]
 
 
-def test_marks_differ_where_anything_that_led_there_differs():
+def test_cache_keys_differ_where_anything_before_differs():
     layout = shown().layout
     plan = Plan(load_scenario("stick_in_tower").assembly, layout.start, layout.poses)
     later = np.array(layout.poses)
@@ -74,14 +74,14 @@ def test_marks_differ_where_anything_that_led_there_differs():
     assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
 
 
-def test_nothing_touches_on_what_is_left_out(monkeypatch):
-    """A full replay, in which every stretch that `contact` would leave out is looked at for contacts of what moves."""
+def test_nothing_touches_on_skipped_stretches(monkeypatch):
+    """A full replay, in which every stretch that `near-contact` would skip is checked for contacts of what moves."""
     its = scene("vanished_fixture")
     met = []
-    left_out: list[tuple[float, float]] = []
+    skipped: list[tuple[float, float]] = []
     follow = Robot.follow
 
-    def looked_at(self, line, guard=None):
+    def follow_checked(self, line, guard=None):
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         held = self.forces.held
@@ -89,16 +89,16 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
         spans = obstacles.near_spans(its, self.data, moving, held, line, s)
         edges = [0, *(edge for span in spans for edge in span), n]
         begin = float(self.data.time)
-        left_out[:] = [
+        skipped[:] = [
             (begin + a * self.step_s, begin + b * self.step_s) for a, b in zip(edges[::2], edges[1::2], strict=True)
         ]
         try:
             return follow(self, line, guard)
         finally:
-            left_out.clear()
+            skipped.clear()
 
     def feel(data):
-        if any(a < data.time < b for a, b in left_out):
+        if any(a < data.time < b for a, b in skipped):
             held = {its.work.free.index(part) for part in hand.get("held", ())}
             for g1, g2 in data.contact.geom[data.contact.dist < 0.0]:
                 pair = [int(its.work.geom_part[g]) for g in (g1, g2)]
@@ -113,7 +113,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
         hand["held"] = parts
         hold(self, *parts)
 
-    monkeypatch.setattr(Robot, "follow", looked_at)
+    monkeypatch.setattr(Robot, "follow", follow_checked)
     monkeypatch.setattr(ForceSensors, "hold", holding)
     monkeypatch.setattr(robot, "TICK_S", 0.005)
     layout = shown("vanished_fixture").layout
@@ -122,7 +122,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch):
     assert met == []
 
 
-def test_contact_simulates_less_and_passes_as_much_time():
+def test_near_contact_takes_as_much_simulated_time():
     layout = shown().layout
     plan = Plan(scene().scenario.assembly, layout.start, layout.poses)
     full, contact = (replay(plan, scene(), config=ExecutionConfig(fidelity)) for fidelity in ("full", "near-contact"))
@@ -132,7 +132,7 @@ def test_contact_simulates_less_and_passes_as_much_time():
         assert contact.reached.final.poses[part] == pytest.approx(T, abs=1e-3), f"{part}: more than it drifts in a hand"
 
 
-def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
+def test_fast_forward_moves_hand_and_parts_as_one_rigid_body():
     its = scene()
     data = initial_state(its.work, shown().layout.start)
     kinematics = its.kinematics
@@ -158,14 +158,14 @@ def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
     assert pose.inverse(later) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-7)
 
 
-def test_no_turn_that_comes_near_anything_is_left_out():
+def test_no_turn_that_comes_near_anything_is_skipped():
     its = scene()
     rng = np.random.default_rng(5)
     data = initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
     hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
     came = 0
-    left_out = 0
+    skipped = 0
     for _ in range(60):
         start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
         end = translate(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
@@ -185,7 +185,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
             ]
             is_near = np.max(depths) > -obstacles.NEAR_HELD_M[0]
             came += is_near
-            left_out += not any(begin <= i <= end for begin, end in spans)
+            skipped += not any(begin <= i <= end for begin, end in spans)
             assert not is_near or any(begin <= i <= end for begin, end in spans)
     assert came > 500
-    assert left_out > 500
+    assert skipped > 500

@@ -16,12 +16,12 @@ def moments(*forces: float) -> list[FilmMoment]:
     return [FilmMoment(0.02 * i, np.zeros(1), Phase(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(pairs)]
 
 
-def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
+def test_a_force_between_two_pictures_is_written_on_the_next() -> None:
     samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sample_moments(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
     assert samples == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
 
 
-def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
+def test_a_trial_is_captioned_by_operation() -> None:
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
     assembly = scene.scenario.assembly

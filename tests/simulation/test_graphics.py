@@ -17,7 +17,9 @@ def loaded():
 """
 REPLAY = """
 import gymnasium, apo_bench
-env = gymnasium.make("APOReplay-v0", scenario="block_on_block", noise_level=0.0, human_error_scale=0.0, render_mode=MODE)
+env = gymnasium.make(
+    "APOReplay-v0", scenario="block_on_block", noise_level=0.0, human_error_scale=0.0, render_mode=MODE
+)
 env.reset(seed=0)
 info = env.step(0 * env.action_space.sample())[-1]
 scene = env.unwrapped._scene

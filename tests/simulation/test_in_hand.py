@@ -1,4 +1,4 @@
-"""What is carried freely stays where it is in the hand, nothing else is held there, and what moves there is noted."""
+"""A part carried freely keeps its pose in the hand, and slips are recorded."""
 
 import mujoco
 import numpy as np
@@ -14,7 +14,7 @@ from apo_bench.simulation.scene.world import initial_state, part_pose, set_part_
 from tests.round_scenes import peg_in_hole
 
 STAYS_MM = 0.03
-"""Put back it moves by some 0.01 mm before it is first looked at, and in the last motion between two looks."""
+"""It moves by some 0.01 mm before the first check, and between the last two checks."""
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_what_is_carried_does_not_creep(round_scene: Scene, monkeypatch: pytest.
     assert all(0.15 < each < 0.85 for each in alone)
 
 
-def test_a_group_is_put_back_as_one_and_what_touches_is_left_alone() -> None:
+def test_a_group_is_put_back_as_one_and_what_touches_is_not_moved() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
     world = scene.work
     start = scene.scenario.start

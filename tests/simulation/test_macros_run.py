@@ -1,4 +1,4 @@
-"""The robot carries out macros that no shipped example has, and feels its way to contacts that are planned wrong."""
+"""The robot carries out macros that no shipped example has, and finds contacts by force where the plan is wrong."""
 
 from pathlib import Path
 
@@ -50,7 +50,7 @@ def names(scenario: Scenario) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("short_mm", [1.0, -2.0])
-def test_a_bottom_is_felt(tmp_path: Path, short_mm: float) -> None:
+def test_a_bottom_is_found_by_force(tmp_path: Path, short_mm: float) -> None:
     """Through one cube into a blind hole: pushed on until the bottom is met, also where it was planned elsewhere."""
     contacts = f'{HOLE.format("cube")}, {HOLE.format("holder")}, ["px", "holder.bottom"]'
     holes = {"cube": ("cube", (-30, 0, 25)), "holder": ("blind.xml", (60, 0, 25))}
@@ -79,7 +79,7 @@ def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
     assert done(scenario, schedule=(Step(0), Step(1), Step(1, True), Step(1))).verdict.as_demonstrated
 
 
-def test_a_corner_is_felt_from_both_sides(tmp_path: Path) -> None:
+def test_a_corner_is_found_by_force_from_both_sides(tmp_path: Path) -> None:
     """Into the corner, out of it sideways and away, back into it, and away again; planned 2 mm inside of the walls."""
     text = 'schema = 1\ntitle = "own"\n[parts.table]\nfile = "table"\nfixed = true\n'
     for name, x, y in (("left", 75, 0), ("back", 0, 50)):

@@ -1,4 +1,4 @@
-"""What a described arm makes of a plan is worked out before it moves, and enters what is foretold of it."""
+"""The plan check of a described arm precedes its motion and enters the prediction."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.prepare import in_reach
 
 
-def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
+def test_a_panda_that_cannot_hold_its_tolerance_is_predicted_to_fail() -> None:
     """The replay is stopped by force at this operation with 0.05 mm, and fits with the 0.25 mm of the scenario."""
     scene = build_scene(load_scenario("shaft_through_brackets"), arm="panda_primitive")
     scenario = scene.scenario
@@ -37,7 +37,7 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
     assert first.struck_mm > 1.0
 
 
-def test_joint_angles_that_were_foretold_are_not_looked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_joint_angles_of_the_plan_check_are_reused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether a plan is in reach is known once it was foretold, also where it is not."""
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)

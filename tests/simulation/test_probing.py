@@ -1,4 +1,4 @@
-"""A robot that feels: where it touches, what lying flat tells, and that it knows nothing but what it touched."""
+"""A robot that probes: where it touches, what laying flat measures, and that it uses touches only."""
 
 from dataclasses import replace
 from functools import cache, partial
@@ -80,7 +80,7 @@ def test_a_robot_that_may_be_far_off_begins_farther_away():
     assert len(walls) == 4
 
 
-def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
+def test_a_robot_farther_off_than_assumed_strikes_the_floor_before_any_operation():
     name = "stick_in_tower"
     error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
     probing = probing_config(plan(name), scene(name), "tool:1.2", (5,), "ideal")
@@ -116,7 +116,7 @@ def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     assert (felt.result.probing.touches, felt.result.probing.refused) == (15, 0)
 
 
-def test_touches_tell_where_the_base_and_the_tool_are():
+def test_touches_measure_the_base_and_the_tool():
     """Walls on all sides: what is left of hand, eye and tool at the goals is a tenth of what was drawn."""
     error = drawn("peg_in_hole", STATED)
     estimate = found_out("peg_in_hole", error)
@@ -130,8 +130,8 @@ def test_touches_tell_where_the_base_and_the_tool_are():
     assert (np.abs(off) < 4.0 * deviations).all()
 
 
-def test_the_robot_knows_nothing_but_what_it_touches():
-    """A base that is off, and a world that stands off the other way: the robot does and believes the same."""
+def test_the_estimate_depends_on_touches_only():
+    """A base that is off, and a world that stands off the other way: motions and estimate are the same."""
     E = pose.at((0.0008, -0.0006, 0.0), (0.0, 0.0, 0.15))
     n = len(plan("peg_in_hole").assembly)
     error = RobotError(E, np.zeros(6), np.eye(4), np.tile(np.eye(4), (n, 1, 1)))
@@ -144,7 +144,7 @@ def test_the_robot_knows_nothing_but_what_it_touches():
     assert one.mean == pytest.approx(other.mean, abs=3e-5)
 
 
-def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
+def test_probing_succeeds_where_a_blind_robot_fails():
     name = "stick_in_tower"
     error = drawn(name, "hand_eye:0.5/0.1+in_hand:0.3/1", 4)
     goals = plan(name).target_poses

@@ -1,4 +1,4 @@
-"""Scenes of convex pieces: their geoms are where the part has them, and what is round rests."""
+"""Scenes of convex pieces: their geoms are where the part has them, and round parts come to rest."""
 
 from pathlib import Path
 

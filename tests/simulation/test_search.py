@@ -1,4 +1,4 @@
-"""Feeling for a hole: what it finds, what it does not, and that it changes nothing where no hole is missed."""
+"""The search for a hole: what it finds, and that it changes nothing where no hole is missed."""
 
 import json
 from functools import cache
@@ -63,13 +63,13 @@ def driven(law, push):
 def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
     name = "vanished_fixture"
     plan = aside("vanished_fixture", 0.6)
-    blind, felt = (carried_out(plan, name, spiral) for spiral in (False, True))
+    blind, searched = (carried_out(plan, name, spiral) for spiral in (False, True))
     assert not blind.verdict.success
-    assert felt.verdict.success
-    assert felt.result.sim_time_s > blind.result.sim_time_s
+    assert searched.verdict.success
+    assert searched.result.sim_time_s > blind.result.sim_time_s
     again = carried_out(plan, name, True)
-    assert again.result.sim_time_s == felt.result.sim_time_s
-    for part, T in felt.result.reached.final.poses.items():
+    assert again.result.sim_time_s == searched.result.sim_time_s
+    for part, T in searched.result.reached.final.poses.items():
         assert again.result.reached.final.poses[part].tobytes() == T.tobytes()
 
 
@@ -88,7 +88,7 @@ def row(method, level, cache=None):
     return run_trial(spec, scene("stick_in_tower"), simulated=shown("stick_in_tower"), cache=cache)
 
 
-def test_shared_beginnings_change_no_byte():
+def test_cached_beginnings_change_no_byte():
     cache = ReplayCache()
     shared = [json.dumps(row(method, 0.1, cache)) for method in ("uncorrected", "spiral-search", "uncorrected")]
     alone = [json.dumps(row(method, 0.1)) for method in ("uncorrected", "spiral-search")]
@@ -99,7 +99,7 @@ def test_shared_beginnings_change_no_byte():
     assert none["failure_prediction"] == search["failure_prediction"]
 
 
-def test_holes_are_felt_for_where_parts_are_inserted():
+def test_only_insertions_have_a_search():
     plan = aside("carried_bridge", 0.0)
     done = [move.transfer for move in moves(plan, scene("carried_bridge"), spiral=True)]
     assert [t.front is not None for t in done] == [False, False, False, True, True]
@@ -110,16 +110,16 @@ def test_holes_are_felt_for_where_parts_are_inserted():
     assert all(move.transfer.front is None for move in moves(plan, scene("carried_bridge")))
 
 
-@pytest.mark.parametrize("way", [DOWN, np.array([0.6, -0.8, 0.0])])
-def test_a_spiral_leaves_no_place_out(way):
+@pytest.mark.parametrize("direction", [DOWN, np.array([0.6, -0.8, 0.0])])
+def test_a_spiral_covers_every_place(direction):
     press = 0.4
-    path = driven(Spiral(Guard(way, 2.0), press, RADIUS_M, 0.001, STEP_S), lambda _: -press * way)
-    assert np.abs(path @ way).max() < 1e-5, "until the force is felt it goes ahead"
+    path = driven(Spiral(Guard(direction, 2.0), press, RADIUS_M, 0.001, STEP_S), lambda _: -press * direction)
+    assert np.abs(path @ direction).max() < 1e-5, "it advances until there is force"
     rng = np.random.default_rng(0)
-    flat = path - (path @ way)[:, None] * way
+    flat = path - (path @ direction)[:, None] * direction
     for _ in range(200):
         place = rng.normal(size=3)
-        place -= (place @ way) * way
+        place -= (place @ direction) * direction
         place *= (RADIUS_M - PITCH_M) * np.sqrt(rng.random()) / np.linalg.norm(place)
         assert np.linalg.norm(flat - place, axis=1).min() < 0.55 * PITCH_M, "half the pitch, and a tenth for its steps"
     assert np.linalg.norm(flat, axis=1).max() < RADIUS_M + PITCH_M

@@ -1,4 +1,4 @@
-"""What a robot does by its wrist: it presses, lays flat and gives way, and feels what the contacts really exert."""
+"""Motions that follow the wrist sensor, and that it measures what the contacts exert."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     return robot, wrist, T_tip_stick
 
 
-def felt(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -> Array:
-    """The mean of what is felt while the robot stands, (6,)."""
+def mean_wrench(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -> Array:
+    """The mean wrench while the robot stands, (6,)."""
     with reading(robot, wrist):
         out = []
         for _ in range(round(seconds / 0.004)):
@@ -88,20 +88,20 @@ def felt(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -
 
 
 @pytest.mark.parametrize(("grasp", "along"), [("friction", 0.06), ("weld", 0.0)])
-def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
+def test_in_free_air_a_held_part_exerts_no_wrench(grasp: str, along: float) -> None:
     robot, wrist, _ = with_stick(grasp, "ideal", along)
     home = robot.T
     for turn in ((0, 0, 0), (0, 15, 30)):
         T = pose.at(home[:3, 3] + [0, 0, 0.05], turn) @ pose.inverse(pose.at(home[:3, 3])) @ home
         robot.go(T, 0.4)
         robot.stand(0.3)
-        wrench = felt(robot, wrist, robot.T[:3, 3], 0.3)
+        wrench = mean_wrench(robot, wrist, robot.T[:3, 3], 0.3)
         # The file says 0.518 N at its nominal size; made with clearance the stick weighs 0.026 N less.
         assert np.abs(wrench[:3]).max() < 0.04
         assert np.abs(wrench[3:]).max() < 0.003
-    # Of a part that nobody spoke of all is felt: its weight, and its lever.
+    # A part that the sensor does not know acts with its weight and its lever.
     wrist.hold()
-    assert felt(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
+    assert mean_wrench(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
 
 
 @pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False), ("panda_primitive", True)])
@@ -124,18 +124,18 @@ class Pushing:
     def __init__(self, newton: float, seconds: float) -> None:
         self.newton = newton
         self.left = round(seconds / READING_S)
-        self.felt: list[Array] = []
+        self.wrenches: list[Array] = []
         self.z = 0.0
 
     def __call__(self, wrench: Array) -> Array | None:
-        self.felt.append(wrench)
+        self.wrenches.append(wrench)
         self.left -= 1
         self.z -= READING_S * float(np.clip(0.0005 * (self.newton - wrench[2]), -0.001, 0.001))
         return None if self.left < 0 else np.array([0.0, 0.0, self.z, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(("arm", "newton"), [("six_axis", 2.0), ("ur5e_primitive", 5.0), ("panda_primitive", 2.0)])
-def test_a_push_on_the_table_is_felt_as_the_contacts_exert_it(arm: str, newton: float) -> None:
+def test_the_wrench_of_a_push_is_that_of_its_contacts(arm: str, newton: float) -> None:
     """Force and torque about the tip, against the contact sensor and the sum over all contacts, within 5 mN, 1 mNm."""
     scene = scene_of(arm)
     with allow_sleep(scene.work, False):
@@ -167,7 +167,7 @@ def by_contacts(robot: Robot, about: Array) -> Array:
 
 
 class Levelling(Pushing):
-    """As that, turning about level axes as the torque asks: what is pressed at its edge comes to lie flat."""
+    """As that, turning about level axes as the torque asks: a part pressed at its edge comes to lie flat."""
 
     def __init__(self, newton: float, seconds: float) -> None:
         super().__init__(newton, seconds)
@@ -197,12 +197,12 @@ def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, alon
     pitch.append(np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0])))
     assert pitch[0] == pytest.approx(-tilt_deg, abs=0.01)
     assert abs(pitch[1]) < 0.01
-    first = next(wrench for wrench in law.felt if wrench[2] > 1.0)
+    first = next(wrench for wrench in law.wrenches if wrench[2] > 1.0)
     # Tilted about y by a positive angle, the end ahead in x is lower and is pushed up: a negative torque about y.
     assert np.sign(first[4]) == -np.sign(tilt_deg)
 
 
-def test_where_the_arm_does_not_reach_it_gives_up() -> None:
+def test_an_unreachable_motion_aborts() -> None:
     robot, wrist = empty_hand(scene_of(), "ideal", 0.1)
     far = iter(range(1, 10_000))
     with pytest.raises(ExecutionAborted, match="unreachable"):
@@ -210,19 +210,19 @@ def test_where_the_arm_does_not_reach_it_gives_up() -> None:
     assert (robot.wrist, robot.fidelity) == (None, "full")
 
 
-def test_joints_that_are_off_turn_the_weight_that_is_taken_off() -> None:
-    """The robot knows its encoders, not its joints, so of 8.83 N of hand some are felt once it is turned."""
+def test_joint_errors_turn_the_weight_that_is_subtracted() -> None:
+    """The robot knows its encoders, not its joints, so a part of the hand's 8.83 N remains once it is turned."""
     scene = scene_of()
     off = np.radians([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     robot = Robot(scene, scene.scenario.start, error=RobotError(np.eye(4), off, np.eye(4), np.eye(4)[None]))
     wrist = wrist_of(robot, "ideal", np.random.default_rng(1))
     zero(robot, wrist)
     assert robot.encoders() == pytest.approx(robot.q, abs=1e-4)
-    assert np.abs(felt(robot, wrist, robot.T[:3, 3])[:3]).max() < 0.01
+    assert np.abs(mean_wrench(robot, wrist, robot.T[:3, 3])[:3]).max() < 0.01
     about = pose.at(robot.T[:3, 3])
     robot.go(about @ pose.at((0, 0, 0), (0, -25, 0)) @ pose.inverse(about) @ robot.T, 0.4)
     robot.stand(0.3)
     # Zeroing took 8.83 N turned by a degree, less 8.83 N, for an offset; turned on by 25 degrees it is none.
     error_n = 8.829 * 2 * np.sin(np.radians(0.5))
-    left = np.linalg.norm(felt(robot, wrist, robot.T[:3, 3])[:3])
+    left = np.linalg.norm(mean_wrench(robot, wrist, robot.T[:3, 3])[:3])
     assert left == pytest.approx(error_n * 2 * np.sin(np.radians(12.5)), rel=0.02)

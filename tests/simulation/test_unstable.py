@@ -27,7 +27,7 @@ from apo_bench.trial.stages import (
 
 SETTINGS = TrialConfig("block_on_block", method="uncorrected", noise_mm=0.5, noise_deg=0.5, seed=1)
 TICKS = 40
-"""After so many looks something happens."""
+"""After so many ticks the state is changed."""
 
 
 @cache
@@ -48,12 +48,12 @@ def folder_of_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def disturb(change: Callable[[Any], None]) -> Callable[[Any], None]:
     """Change the state of a simulation once."""
-    looks = 0
+    ticks = 0
 
     def watch(data: Any) -> None:
-        nonlocal looks
-        looks += 1
-        if looks == TICKS:
+        nonlocal ticks
+        ticks += 1
+        if ticks == TICKS:
             change(data)
 
     return watch
@@ -110,7 +110,7 @@ def test_a_demonstration_that_becomes_unstable_has_failed(
     assert np.isfinite(demonstration.poses).all()
 
 
-def test_where_settling_fails_goals_stay_as_they_were_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_settling_fails_poses_stay_as_observed(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: Observation = observe_demonstration(simulated(), noise_of(SETTINGS, scene(), simulated()), SETTINGS.seed)
     assert not np.array_equal(np.asarray(settle(seen)), seen.poses)
     monkeypatch.setattr(settling.mujoco, "mj_step", fail)

@@ -1,4 +1,4 @@
-"""The sensor at the wrist: what it shows of nothing, of weights, of noise, of a blow, and that it costs nothing off."""
+"""The wrist sensor: weights, noise, blows, zeroing, and that it is off unless it is used."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def wrist(scene: Scene, noise: FtNoise, seed: int = 1, **settings) -> SimpleName
 
 
 def shown(made: SimpleNamespace, steps: int, step_s: float = 0.001) -> np.ndarray:
-    """What is felt at the sensor's origin after each reading, (readings, 6), world."""
+    """The wrench at the sensor's origin after each reading, (readings, 6), world."""
     at = made.sensor._sensor()[:3, 3]
     return np.array([made.sensor.wrench(at) for _ in range(steps) if made.sensor.take(step_s)])
 
@@ -48,7 +48,7 @@ def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_
 
 
 @pytest.mark.parametrize("step_s", [0.0005, 0.0001])
-def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, step_s: float) -> None:
+def test_readings_do_not_depend_on_the_step(tower: Scene, step_s: float) -> None:
     """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
     felt = []
     for step in (0.001, step_s):
@@ -82,7 +82,7 @@ def test_the_offset_of_a_trial_is_drawn_and_zeroing_removes_it(tower: Scene) -> 
     assert np.abs(felt[3:]).max() < 0.0015
 
 
-def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_asked(tower: Scene) -> None:
+def test_force_and_torque_are_those_of_the_surroundings_about_a_point(tower: Scene) -> None:
     """5 N upwards at a point 50 mm in front of the sensor's origin, in x: about that point there is no torque."""
     made = wrist(tower, FtNoise(0.0, 0.0))
     T = made.sensor._sensor()
@@ -98,7 +98,7 @@ def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_
     assert not made.sensor.stops(None)
 
 
-def test_the_sensors_of_the_wrist_are_off_unless_they_are_asked(tower: Scene) -> None:
+def test_the_wrist_sensors_are_off_unless_switched_on(tower: Scene) -> None:
     model = tower.work.model
     data = mujoco.MjData(model)
     for _ in range(3):

@@ -16,7 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
 from apo_bench.viz.correct_text import POSE_COLUMNS, correction_form, correction_lines
-from apo_bench.viz.detection_text import detection_form, evidence_table
+from apo_bench.viz.detection_text import CONTACT_COLUMNS, detection_form
 from apo_bench.viz.form_text import form_table
 from tests import scenes
 
@@ -55,7 +55,7 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
     recognised = DetectedContacts(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
     form = detection_form("tower", "detected", observation, recognised, False)
-    _, right, wrong = table_lines(evidence_table(form))
+    _, right, wrong = table_lines(form_table(form["contacts"], CONTACT_COLUMNS))
     numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
     assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
     assert wrong == ["1", "castle1.py", "table.top", *numbers, "False"]

@@ -11,10 +11,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.importers.cad.assembled import coming_near
 from apo_bench.importers.cad.importing import import_part, raw_solids
 from apo_bench.importers.cad.places import named_places, write_places
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.naming import clean_title, part_name
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, part_name
 
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005

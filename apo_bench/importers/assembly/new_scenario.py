@@ -15,11 +15,13 @@ from apo_bench.importers.assembly.ordering import OrderSearch, Placing
 from apo_bench.importers.assembly.posed import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
 from apo_bench.importers.assembly.touching import close_contacts, find_clashes, find_contacts, walls_without_play
-from apo_bench.importers.cad.solids.naming import free_name
+from apo_bench.importers.cad.solids import free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site
 
 _LOW_M = 1e-4
+_PLAY_M = 1e-3
+"""Flat walls that are closer to each other were drawn as a fit."""
 _GROUP_ROOM_M = 0.05
 _FARTHEST_ASIDE_M = 0.26
 
@@ -83,11 +85,17 @@ def new_scenario(
     if clashes:
         raise RuntimeError("; ".join(clashes) + ".")
     poses, contacts, dropped = close_contacts(solids, poses, find_contacts(solids, poses), (TABLE, *base))
+    apart = set(find_contacts(solids, poses, _PLAY_M)) - {*contacts, *dropped}
     notes = [
         *(f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped),
         *(
             f"'{contact}' and '{opposite}' leave no play between them; state fit = true for its faces"
             for contact, opposite in walls_without_play(solids, poses, contacts)
+        ),
+        *(
+            f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing; draw them "
+            "line to line, and the added clearance gives them play"
+            for contact, opposite in walls_without_play(solids, poses, sorted(apart))
         ),
     ]
     reach = find_reach(solids, poses, [each.name for each in parts])

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, Solid, pose, world_bounds
-from apo_bench.importers.cad.solids.naming import free_name
+from apo_bench.importers.cad.solids import free_name
 from apo_bench.io import Table, read_typed
 from apo_bench.scenario.parts import load_part, part_path
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME

@@ -31,7 +31,7 @@ _THREAD_M = 2.5e-3
 
 
 def find_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR_M) -> tuple[Contact, ...]:
-    """Every pair of faces of different parts that touch, or are no farther apart, in the order of the parts."""
+    """Return every pair of faces of different parts that touch, or are no farther apart, in the order of the parts."""
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
         for a, b in combinations(solids, 2)
@@ -42,7 +42,7 @@ def find_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR
 def close_contacts(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact], fixed: Iterable[str]
 ) -> tuple[Poses, tuple[Contact, ...], tuple[Contact, ...]]:
-    """Poses at which contacts are closed, those contacts, and those that no poses close together with the others."""
+    """Return poses at which contacts are closed, these contacts, and those that contradict them."""
     kept = list(contacts)
     dropped = list[Contact]()
     free = [part for part in solids if part not in set(fixed)]

@@ -9,7 +9,6 @@ from apo_bench.importers.assembly.added_clearance import MOST_OVERLAP_MM, add_cl
 from apo_bench.importers.assembly.new_scenario import NewScenario, NoOrder, lowest, new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
 
-USUAL_MM = 0.25
 _UP_AXES = ("z", "-z", "x", "-x", "y", "-y")
 _MOST_BASES = 3
 
@@ -18,7 +17,7 @@ def new_upright_scenario(
     parts: Sequence[PosedPart],
     up: str | None = None,
     fixed: Sequence[str] = (),
-    clearance_mm: float = USUAL_MM,
+    clearance_mm: float = 0.25,
     most_overlap_mm: float = MOST_OVERLAP_MM,
     wanted_order: Sequence[str] = (),
 ) -> NewScenario:

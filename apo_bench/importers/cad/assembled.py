@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.cad.solids.bodies import body_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids import Mesh, RawSolid, body_of
 
 _STEP_MM = 1.0
 """The distance of points, and of the positions on a way."""

@@ -5,15 +5,14 @@ import shapely
 
 from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straighten
 from apo_bench.importers.cad.faces.fitting import ON_WALL
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import RawSolid, Region, square_to
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05
 
 
 def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
-    """Flat and round faces of the regions that have names; those that cannot be stated, with the reason."""
+    """Return flat and round faces of the regions that have names; those that cannot be stated, with the reason."""
     flats: list[Face] = []
     rounds: list[RoundFace] = []
     refused: dict[str, str] = {}

@@ -18,8 +18,7 @@ from apo_bench.importers.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.importers.cad.meshes.shells import closed_solids
 from apo_bench.importers.cad.moments import moments_of_pieces, solid_moments
 from apo_bench.importers.cad.pieces.cutting import Cut, cut
-from apo_bench.importers.cad.solids.naming import clean_title, name_regions
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, merge_copies
+from apo_bench.importers.cad.solids import RawSolid, clean_title, merge_copies, name_regions
 from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.agreement import check_faces, supported

@@ -8,10 +8,7 @@ import trimesh
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.pieces.cutting import Cut
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, mesh_of
 from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids import RawSolid
 from apo_bench.io import default_looks, save_figure
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))

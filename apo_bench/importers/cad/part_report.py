@@ -9,8 +9,7 @@ import numpy as np
 
 from apo_bench.importers.cad.importing import ImportedPart
 from apo_bench.importers.cad.meshes.mesh_file import CadFile
-from apo_bench.importers.cad.solids.naming import clean_title
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Region, clean_title
 
 
 def report_file(file: CadFile, path: Path, parts: Sequence[ImportedPart], poses: Path | None) -> dict[str, Any]:

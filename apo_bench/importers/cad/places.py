@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.importers.cad.solids.naming import clean_title, part_name
-from apo_bench.importers.cad.solids.raw_solid import SolidPlace
+from apo_bench.importers.cad.solids import SolidPlace, clean_title, part_name
 from apo_bench.io import write_file
 
 

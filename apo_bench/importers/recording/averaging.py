@@ -44,7 +44,7 @@ def per_axis(C: Array) -> tuple[float, float]:
 
 
 def average(T: Array) -> Mean:
-    """The mean of poses (n, 4, 4): that about which inliers have no mean twist.
+    """Return the mean of poses (n, 4, 4): that about which inliers have no mean twist.
 
     Outliers are frames that are more than `_FAR` robust standard deviations off along or about an axis.
     """
@@ -63,7 +63,7 @@ def average(T: Array) -> Mean:
 
 
 def pool_mean(mean: Mean, others: Array) -> Mean:
-    """The mean with a covariance that also knows the frames of other rests.
+    """Return the mean with a covariance that also knows the frames of other rests.
 
     Args:
         others: (6, 6), covariance of one frame there, in the axes of the camera.
@@ -76,7 +76,7 @@ def pool_mean(mean: Mean, others: Array) -> Mean:
 
 
 def common_scatter(means: list[Mean]) -> Array:
-    """The covariance of one frame over many rests, (6, 6), in the axes of the camera."""
+    """Return the covariance of one frame over many rests, (6, 6), in the axes of the camera."""
     freedom = [float(mean.inlier.sum()) - 1.0 for mean in means]
     axes = [np.kron(np.eye(2), mean.T[:3, :3]) for mean in means]
     scatters = [n * A @ mean.scatter @ A.T for n, A, mean in zip(freedom, axes, means, strict=True)]

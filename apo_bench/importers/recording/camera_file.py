@@ -77,7 +77,7 @@ class CameraFile:
     """(2,), standard deviation of the error that stays while a part rests, per axis, [m, rad]; None: not stated."""
 
     def places(self, planned: Mapping[str, Array]) -> Mapping[str, Array]:
-        """Where known parts stand in the world, (4, 4), [m].
+        """Return where known parts stand in the world, (4, 4), [m].
 
         Args:
             planned: Where the scenario starts them.
@@ -86,10 +86,10 @@ class CameraFile:
 
 
 def read_camera(path: str | Path) -> CameraFile:
-    """What a camera file states.
+    """Read a camera file.
 
     Raises:
-        InputError: Anything that is not as described, naming file and key.
+        InputError: A key or value is wrong; the message names it.
     """
     top = read_typed(path, CameraTable, "camera file")
     require(

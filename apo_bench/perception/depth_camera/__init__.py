@@ -1,1 +1,1 @@
-"""From range images to poses: what changed, which part it is, where it stands."""
+"""Poses from range images, measured in place of drawn."""

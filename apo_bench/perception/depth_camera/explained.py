@@ -1,4 +1,4 @@
-"""How much of what appeared between two range images a model explains, where it is put."""
+"""The share of a change between two range images that a model explains."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Put a surface where measured points are, by small_gicp, and say how well that is known."""
+"""Fit a surface to measured points with small_gicp, with the covariance of the fit."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

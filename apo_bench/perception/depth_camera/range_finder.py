@@ -1,4 +1,4 @@
-"""The range finder: its pinhole views, where they stand, and what its sensor makes of true distances."""
+"""The range finder: pinhole views, and the errors of its sensor."""
 
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -65,7 +65,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _two_views(width: int = 400, height: int = 300) -> tuple[PinholeView, ...]:
+def _two_views() -> tuple[PinholeView, ...]:
     """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
 
     One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
@@ -75,7 +75,7 @@ def _two_views(width: int = 400, height: int = 300) -> tuple[PinholeView, ...]:
     height_m = 0.67
     at = np.array(VIEWED_POINT_M)
     ways = (np.array([side * 0.707 * reach, side * 0.707 * reach, height_m]) for side in (1.0, -1.0))
-    return tuple(PinholeView(look_at(at + way, at), width, height, 48.0) for way in ways)
+    return tuple(PinholeView(look_at(at + way, at), 400, 300, 48.0) for way in ways)
 
 
 @final

@@ -1,4 +1,4 @@
-"""What says where rays strike models of parts: the simulator does, without being known here."""
+"""The interface of a ray caster, which the simulator implements."""
 
 from collections.abc import Callable, Mapping
 

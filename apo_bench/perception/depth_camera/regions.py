@@ -1,4 +1,4 @@
-"""The difference of two range images: where something appeared or vanished."""
+"""Regions that differ between two range images."""
 
 from typing import NamedTuple
 

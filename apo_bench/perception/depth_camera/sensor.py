@@ -1,4 +1,4 @@
-"""The range finder as a sensor of poses: from true range images of a demonstration to an observation of it."""
+"""The range finder as a sensor of poses: range images in, an observation out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

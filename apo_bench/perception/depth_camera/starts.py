@@ -1,4 +1,4 @@
-"""Where a fit may begin: the ways in which a part that stands on a table may have the measured points."""
+"""Start poses of a fit: the ways in which a part that stands on a table may have the measured points."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The surface of a part as a cloud of points, which small_gicp holds measured points against."""
+"""The surface of a part as a cloud of points for small_gicp."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A pair of faces that may touch, within the thresholds of the noise."""
+"""Candidates: pairs of faces that may touch, within the thresholds of the noise."""
 
 from math import sqrt
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Where operations put things if some contacts hold: which faces may touch then, and how sure that is."""
+"""The situation after an operation if some contacts hold: candidates for more, and their uncertainty."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass

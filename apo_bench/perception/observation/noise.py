@@ -1,4 +1,4 @@
-"""What a noise model is, and the one that a name stands for."""
+"""Noise models by name."""
 
 import inspect
 import math

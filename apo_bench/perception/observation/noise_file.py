@@ -1,4 +1,4 @@
-"""Noise files, by path or by the name under which they come with the package: a measured estimator as TOML."""
+"""Noise files: a measured pose estimator as TOML."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,6 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, pose
 from apo_bench.io import Table, Text, read_typed, toml_text
 from apo_bench.perception.observation.models import (
     LEAST_FREEDOM,
@@ -131,8 +130,8 @@ def _tail(scale: float, freedom: float) -> Tail:
     return Tail(scale, freedom if freedom < _HUGE else math.inf)
 
 
-def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = (), T_world_camera: Array | None = None) -> str:
-    """Return a noise file as text, with notes at its head, and the pose of the camera if it is known."""
+def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
+    """Return a noise file as text, with notes at its head."""
     document = {
         "schema": "apo-bench/noise/2",
         "source": measured.source,
@@ -142,9 +141,6 @@ def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = (), T_world_cam
         "shift": _split_form(measured.shift_mm, "mm"),
         "turn": _split_form(measured.turn_deg, "deg"),
     }
-    if T_world_camera is not None:
-        at_mm = [_digits(x, 9) for x in 1e3 * T_world_camera[:3, 3]]
-        document["camera"] = {"at_mm": at_mm, "turn_deg": [_digits(x, 9) for x in pose.turn_deg(T_world_camera)]}
     return "".join(f"# {note}\n" for note in notes) + toml_text(document)
 
 
@@ -158,5 +154,5 @@ def _split_form(split: Split, unit: str) -> dict[str, float]:
     }
 
 
-def _digits(x: float, digits: int = 5) -> float:
-    return float(f"{x:.{digits}g}")
+def _digits(x: float) -> float:
+    return float(f"{x:.5g}")

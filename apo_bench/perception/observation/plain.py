@@ -1,4 +1,4 @@
-"""A plain function `(poses, rng) -> poses` as a noise model, with the deviations that it declares."""
+"""A plain function `(poses, rng) -> poses` as a noise model."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Wrong contacts, to see what a corrector makes of them.
+"""Sources of wrong contacts, to test what a corrector makes of them.
 
 `missed`     one contact was not noticed
 `false`      one contact too many: two faces that only come near each other

@@ -1,4 +1,4 @@
-"""Assemblies that a seed draws: parts, contacts, order and grasps by construction."""
+"""Generated assemblies: a seed draws parts, contacts, order and grasps."""
 
 from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.scenario.generated.names import (

@@ -1,4 +1,4 @@
-"""What a generated assembly is made of: operations with the contacts that they make, and stations beside each other.
+"""A generated assembly: operations, and the stations of a board.
 
 Lengths in mm, in the frame of the assembly: x along the board, z up from the table.
 """

@@ -1,4 +1,4 @@
-"""The solids that generated parts are: blocks, boards, axles, rings, and prisms with slots and slopes; lengths in mm.
+"""Bodies of generated parts, lengths in mm.
 
 Holes and slots are marked fit and get wider by the clearance. What goes into them stays as it is drawn.
 """
@@ -50,9 +50,9 @@ def box(
     return extrude(outline, at[2], at[2] + size[2])
 
 
-def hole(pin: Pin, high: float, low: float = 0.0) -> Bore:
-    """The hole for a pin, from one height to another one."""
-    return bore((pin.x, pin.y), pin.radius, low, high, pin.name, fit=True)
+def hole(pin: Pin, high: float) -> Bore:
+    """The hole for a pin, from 0 to a height."""
+    return bore((pin.x, pin.y), pin.radius, 0.0, high, pin.name, fit=True)
 
 
 def block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:

@@ -1,4 +1,4 @@
-"""Families of assemblies: which stations stand on a board, and how many parts each has."""
+"""Families of generated assemblies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -44,8 +44,6 @@ class Family(NamedTuple):
     """Least and most parts, the board among them."""
     weight: int
     """How often a seed without a family draws it, of the sum of all; 0: it is held out for tests."""
-    needs_more: bool
-    """Whether laying each part onto its newest contacts is not enough."""
 
     def draw(self, rng: np.random.Generator) -> GeneratedAssembly:
         """One assembly of the family."""
@@ -106,17 +104,17 @@ _KINDS: Mapping[str, Kind] = {
 _EVERY = ("corner", "peg", "post", "covered", "pinned", "bridged", "keyed", "grooved", "carried")
 
 FAMILIES: Mapping[str, Family] = {
-    "corners": Family("Blocks in corners of walls, and piles of blocks", ("corner",), (3, 10), 2, False),
-    "pegs": Family("Axles with collars in bores, and rings over them", ("peg",), (3, 9), 2, False),
-    "posts": Family("Plates over one post or two", ("post",), (3, 10), 2, False),
-    "covers": Family("A cover over axles, and rings on it", ("covered",), (4, 10), 2, False),
-    "carried": Family("Axles that carry their rings from a stand", ("carried",), (4, 10), 2, False),
-    "pinned": Family("Loose plates that axles join", ("pinned",), (4, 12), 3, True),
-    "bridges": Family("Loose towers that plates join", ("bridged",), (4, 10), 3, True),
-    "keys": Family("Keys in a slot that a bar joins", ("keyed",), (4, 12), 3, True),
-    "grooves": Family("Keys with tilted faces that a bar joins", ("grooved",), (4, 12), 3, True),
-    "mixed": Family("Stations of all kinds", _EVERY, (5, 12), 6, True),
-    "castles": Family("Loose blocks that a stick in their slots joins", ("castled",), (4, 8), 0, True),
-    "rods": Family("Loose brackets that a level rod joins", ("threaded",), (3, 4), 0, True),
+    "corners": Family("Blocks in corners of walls, and piles of blocks", ("corner",), (3, 10), 2),
+    "pegs": Family("Axles with collars in bores, and rings over them", ("peg",), (3, 9), 2),
+    "posts": Family("Plates over one post or two", ("post",), (3, 10), 2),
+    "covers": Family("A cover over axles, and rings on it", ("covered",), (4, 10), 2),
+    "carried": Family("Axles that carry their rings from a stand", ("carried",), (4, 10), 2),
+    "pinned": Family("Loose plates that axles join", ("pinned",), (4, 12), 3),
+    "bridges": Family("Loose towers that plates join", ("bridged",), (4, 10), 3),
+    "keys": Family("Keys in a slot that a bar joins", ("keyed",), (4, 12), 3),
+    "grooves": Family("Keys with tilted faces that a bar joins", ("grooved",), (4, 12), 3),
+    "mixed": Family("Stations of all kinds", _EVERY, (5, 12), 6),
+    "castles": Family("Loose blocks that a stick in their slots joins", ("castled",), (4, 8), 0),
+    "rods": Family("Loose brackets that a level rod joins", ("threaded",), (3, 4), 0),
 }
 """Those with weight 0 are held out: no `generated:SEED` is one of them, nor has a kind of station of theirs."""

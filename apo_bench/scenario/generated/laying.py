@@ -1,4 +1,4 @@
-"""Where the site is, and where each part waits beside it: in reach, with room for the hand; lengths in mm."""
+"""Lay out a table: the site, and start poses in reach of the arm; lengths in mm."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What is put down loosely first, and is in its place only when a later part links it with others; lengths in mm."""
+"""Stations whose parts lie loosely until a later part links them; lengths in mm."""
 
 from collections.abc import Callable
 from typing import NamedTuple

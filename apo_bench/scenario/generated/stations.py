@@ -1,4 +1,4 @@
-"""What is put together at one place of a board, each part onto what is fixed or was put there right before.
+"""Stations whose parts each go onto a fixed one, or onto the part before.
 
 Sizes are such that fingers, 12 mm thick and 10 mm below their tips, pass beside what stands around. Lengths in mm.
 """

@@ -1,4 +1,4 @@
-"""A generated assembly as files: a scenario and its parts, as a person would write them."""
+"""Write a generated assembly as scenario and part files."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

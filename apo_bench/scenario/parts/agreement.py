@@ -1,4 +1,4 @@
-"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
+"""Checks that the stated faces of a part lie on its pieces."""
 
 from collections.abc import Iterable
 from dataclasses import replace

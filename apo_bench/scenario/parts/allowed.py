@@ -1,4 +1,4 @@
-"""How large a part may be, and what its pieces and faces may be called."""
+"""Limits of parts, and names that are allowed."""
 
 import re
 

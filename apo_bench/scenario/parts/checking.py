@@ -1,4 +1,4 @@
-"""Check what is stated of a part against its pieces: one solid, with these faces and this matter."""
+"""Checks of what is stated of a part against its pieces."""
 
 from collections.abc import Sequence
 

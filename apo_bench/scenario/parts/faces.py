@@ -1,4 +1,4 @@
-"""The union of boxes as a solid with flat faces, exactly: on the grid that the sides of all boxes make.
+"""The union of boxes as a solid with flat faces, exactly.
 
 A mesh union computes in rounded numbers and leaves stray corners and fins where boxes share planes; on the grid every
 cell is full or empty, and a face is what lies between the two.

@@ -1,4 +1,4 @@
-"""A part some of whose faces recede although its file does not say so."""
+"""Mark faces of a part as fit, so that they recede by the clearance."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A part file becomes a solid with named faces."""
+"""Load a part file as a solid with named faces."""
 
 from collections import Counter
 from pathlib import Path

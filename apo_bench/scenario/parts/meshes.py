@@ -1,4 +1,4 @@
-"""Convex pieces of part files, with corners of their own only."""
+"""Convex pieces of part files."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A part file becomes convex pieces: of boxes alone, sites name faces; of any other, the file beside it does."""
+"""Read a part file as convex pieces."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

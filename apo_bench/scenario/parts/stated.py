@@ -1,4 +1,4 @@
-"""What stands beside a part file whose pieces are not boxes alone: its faces, its matter, where it comes from."""
+"""Read the file beside a part file: faces and matter of the part."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

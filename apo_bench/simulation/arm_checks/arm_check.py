@@ -119,7 +119,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
 
 
 def missing_data(arm: Arm) -> list[str]:
-    """What a file could say and does not, and what is wrong with the gripper that was measured."""
+    """What the files of an arm could state and do not, each with what follows from that."""
     missing = []
     if arm.limits.payload_kg is None:
         missing.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
@@ -187,11 +187,10 @@ def _force(arm: Arm, scene: Scene) -> float:
 
 
 def _margins(scene: Scene, plan: Plan) -> Array:
-    low, high = scene.kinematics.range_of_joints
     least = np.full(len(scene.arm.joints), np.inf)
     for move in moves(plan, scene):
         angles = key_angles(move.transfer, scene)
         if angles.code:
             return np.full(len(least), np.nan)
-        least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in angles.reached], axis=0))
+        least = np.minimum(least, np.min(list(map(scene.kinematics.limit_margins, angles.reached)), axis=0))
     return np.degrees(least)

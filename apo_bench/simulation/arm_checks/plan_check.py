@@ -67,7 +67,6 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
         return ArmMove(step.operation, step.undo)
     T_tip = scene.kinematics.forward(path[-1])
     depth, struck = struck_by(scene, t, estimated, after)
-    low, high = scene.kinematics.range_of_joints
     return ArmMove(
         operation=step.operation,
         undo=step.undo,
@@ -75,14 +74,13 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
         struck_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
         beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),
-        margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
+        margin_deg=float(np.degrees(np.min(list(map(scene.kinematics.limit_margins, path))))),
     )
 
 
 def _at_limit(scene: Scene, q: Array) -> str:
     """The joint at its limit where the search for joint angles ended, at q, or nothing."""
-    low, high = scene.kinematics.range_of_joints
-    room = np.minimum(q - low, high - q)
+    room = scene.kinematics.limit_margins(q)
     k = int(room.argmin())
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
 

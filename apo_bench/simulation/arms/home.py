@@ -67,7 +67,7 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
     """How many places on the table are reached from the best home, and that, [rad]; None where there is no home."""
     kinematics = Kinematics(arm, posture=False)
     rng = np.random.default_rng(0)
-    low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
+    low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.joint_range)
     homes: list[tuple[Array, float]] = []
     for i in range(tries):
         start = rng.uniform(low, high)
@@ -77,7 +77,7 @@ def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
         q = kinematics.inverse(tip_down(np.array(_AT), way), start, 25)
         if q is None:
             continue
-        q = _unwind(q, *kinematics.range_of_joints)
+        q = _unwind(q, *kinematics.joint_range)
         if any(np.abs(q - other).max() < _SAME_RAD for other, _ in homes) or _in_table(kinematics, q):
             continue
         homes.append((q, way))
@@ -101,7 +101,6 @@ def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
         way: How the tip is turned there, [rad].
     """
     kinematics.keep_near(home)
-    low, high = kinematics.range_of_joints
     reached = 0
     least = np.inf
     for turn in _TURNS:
@@ -109,7 +108,7 @@ def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
             q = kinematics.inverse(tip_down(np.array(at), way + turn), home, 25)
             if q is not None:
                 reached += 1
-                least = min(least, float(np.minimum(q - low, high - q).min()))
+                least = min(least, float(kinematics.limit_margins(q).min()))
     return reached, least
 
 

@@ -64,9 +64,14 @@ class Kinematics:
         return str(self.model.body(int(self.model.tree_bodyadr[tree])).name)
 
     @property
-    def range_of_joints(self) -> Array:
+    def joint_range(self) -> Array:
         """(2, joints): the lowest and the highest angle of each, [rad]."""
         return self._range[:, self.ids]
+
+    def limit_margins(self, q: Array) -> Array:
+        """How far each joint is from its nearer limit, (joints,), [rad]."""
+        low, high = self.joint_range
+        return np.asarray(np.minimum(q - low, high - q))
 
     @property
     def last(self) -> Array:

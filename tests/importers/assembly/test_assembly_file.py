@@ -62,15 +62,6 @@ def test_the_frame_of_a_turned_part_lies_on_its_axis(tmp_path: Path) -> None:
     np.testing.assert_allclose(1e3 * found.T[:3, 3], (20, 5, 10), atol=1.1e-3)
 
 
-def test_a_hole_away_from_the_middle_does_not_draw_the_frame_to_it(tmp_path: Path) -> None:
-    base = block(60, 40, 10) - rod(4, 10, (15, 5, 0))
-    poses, _ = import_assembly([stl(tmp_path, base, block(20, 20, 8, (-10, 0, 10)))], tmp_path / "parts")
-    part = next(each for each in read_posed(poses) if each.solid.rounds)
-    np.testing.assert_allclose(1e3 * part.T[:3, 3], (0, 0, 0), atol=1e-3)
-    (wall,) = part.solid.rounds.values()
-    np.testing.assert_allclose(1e3 * wall.ends[:, :2], [(15, 5), (15, 5)], atol=0.01)
-
-
 def test_a_cavity_is_no_solid(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the file holds one solid"):
         import_assembly([stl(tmp_path, block(40, 40, 40) - block(20, 20, 20, (0, 0, 10)))], tmp_path / "parts")

@@ -47,12 +47,6 @@ def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None
         new_upright_scenario(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
 
 
-def test_what_touches_nothing_has_no_order(tmp_path: Path) -> None:
-    parts = made(tmp_path, plate=(FLOOR, (0, 0, 0)), core=(CORE, (0, 0, 10.4)))
-    with pytest.raises(NoOrder, match=r"'core' touches nothing"):
-        new_upright_scenario(parts, "z")
-
-
 def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
     cup = join(FLOOR, box(10, 14))
     parts = made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10)))

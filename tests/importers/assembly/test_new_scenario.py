@@ -165,18 +165,6 @@ def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
     assert grasp.point[2] - 0.010 > 0.0085
 
 
-def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:
-    beside = made(
-        tmp_path,
-        {"plate": plate(15, 4.2), "pin": PIN},
-        {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 8))},
-    )
-    with pytest.raises(RuntimeError, match="nothing is below 'pin'"):
-        new_scenario(on_the_table(beside))
-    with pytest.raises(InputError, match="unknown part 'pn'"):
-        new_scenario(on_the_table(beside), ("pn",))
-
-
 def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     base = extrude(rectangle(60, 60), 0, 20, bottom="bottom", top="top")
     bar = extrude(rectangle(100, 20), 0, 10, bottom="bottom", top="top")

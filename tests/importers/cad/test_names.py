@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.importers.assembly.posed import read_posed
-from apo_bench.importers.cad.solids.naming import part_name
+from apo_bench.importers.cad.solids import part_name
 from apo_bench.scenario.parts.stated import read_stated_part
 from tests.importers.cad.made import L_SHAPE, block, prism, write_stl
 

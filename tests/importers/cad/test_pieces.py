@@ -11,9 +11,7 @@ from apo_bench.importers.cad.assembled import coming_near, surface_points
 from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.pieces.cutting import cut
 from apo_bench.importers.cad.pieces.refining import depths
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.naming import name_regions
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.importers.cad.solids import RawSolid, SolidPlace, mesh_of, name_regions
 from tests.importers.cad.made import block, rod
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -64,13 +63,6 @@ def test_what_is_no_part_is_refused_in_one_sentence(
     assert "\n" not in str(raised.value)
     assert main(["part", "import", str(tmp_path / "none.stl"), "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.parametrize(("scale", "unit"), [(0.1 / 30, "mm"), (0.1, "m")])
-def test_what_is_too_small_or_too_large_for_a_part_is_refused(scale: float, unit: str, tmp_path: Path) -> None:
-    path = write_stl(block(30, 30, 30), tmp_path / "a.stl", scale)
-    with pytest.raises(InputError, match="parts of 1 mm to 2 m are allowed"):
-        raw_solids(path, unit)
 
 
 def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,19 +172,6 @@ def test_step_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         raw_solids(path, None)
     with pytest.raises(InputError, match="a STEP file states its own"):
         raw_solids(path, "mm")
-
-
-def test_places_of_several_solids_are_written(tmp_path: Path) -> None:
-    a = block(30, 20, 10)
-    b = block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
-    path = write_triangles(
-        np.concatenate([triangles(each) for each in (a, b, block(9, 8, 7, (0, 60, 0)))]), tmp_path / "a.stl"
-    )
-    assert main(["part", "import", str(path), "--out", str(tmp_path / "out")]) == 0
-    poses = tomllib.loads((tmp_path / "out" / "poses.toml").read_text())["pose"]
-    assert [(each["part"], each["name"]) for each in poses] == [("a_1", "a_1"), ("a_1", "a_2"), ("a_3", "a_3")]
-    assert poses[1]["at_mm"] == pytest.approx([50, 0, 0], abs=1e-4)
-    assert poses[1]["quaternion_wxyz"] == pytest.approx([np.cos(np.pi / 12), 0, 0, np.sin(np.pi / 12)], abs=1e-6)
 
 
 def test_triangles_without_an_area_change_nothing(tmp_path: Path) -> None:

@@ -14,9 +14,7 @@ from manifold3d import CrossSection, Manifold
 
 from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.meshes.shells import closed_solids
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Mesh, Region, mesh_of
 from tests.importers.cad.made import block, prism, rod
 
 

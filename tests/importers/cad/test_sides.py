@@ -11,7 +11,7 @@ import trimesh
 
 from apo_bench.importers.cad.importing import import_part, raw_solids
 from apo_bench.importers.cad.part_report import part_lines, report_part
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
+from apo_bench.importers.cad.solids import RawSolid
 from tests.importers.cad.made import write_triangles
 
 

@@ -144,11 +144,6 @@ def test_a_root_that_holds_no_mesh_takes_objects_of_other_models() -> None:
     assert mesh.corners.min(axis=0).tolist() == [60, 0, 0]
 
 
-def test_an_item_of_the_build_may_name_another_model_and_builds_of_other_models_place_nothing() -> None:
-    root = of_production("", '<item p:path="/3d/objects/PIN.model" objectid="1"/>')
-    assert sizes(several(root=root, pin=of_production(box(1, 12, 12, 40), '<item objectid="1"/>'))) == [[12, 12, 40]]
-
-
 @pytest.mark.parametrize("kind", ["support", "other"])
 def test_supports_are_left_out_and_counted_also_where_an_object_around_them_is_one(kind: str) -> None:
     around = refers(3, 1).replace("<object ", f'<object type="{kind}" ')

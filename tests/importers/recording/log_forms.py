@@ -35,24 +35,6 @@ class Form(NamedTuple):
     write: Callable[[Mapping[str, Tracked], Path], None]
 
 
-def camera_text(log: str, known: Mapping[str, str], stays: float | None) -> str:
-    """A camera file: how the log is written, and which parts stand on known places."""
-    lines = ['schema = "apo-bench/camera/1"', "", *(["[log]", log, ""] if log else []), "[known]"]
-    lines += [f"{part} = {place}" for part, place in known.items()]
-    lines += [] if stays is None else ["", "[noise]", f"stays_mm = {stays:g}", f"stays_deg = {stays:g}"]
-    return "\n".join(lines) + "\n"
-
-
-def objects_text(found: Mapping[str, Tracked]) -> str:
-    """An objects file."""
-    lines = ['schema = "apo-bench/objects/1"', "", "[objects]"]
-    for part, one in found.items():
-        packed = pose.pack(one.T_model_part)
-        at, q = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (packed[:3] * 1e3, packed[3:]))
-        lines.append(f'{part} = {{ id = "{one.id}", frame = {{ at_mm = [{at}], quaternion_wxyz = [{q}] }} }}')
-    return "\n".join(lines) + "\n"
-
-
 def _rows(found: Mapping[str, Tracked]) -> list[tuple[float, str, Array]]:
     return sorted(
         ((t, one.id, T) for one in found.values() for t, T in zip(one.t, one.T, strict=True)), key=lambda r: r[:2]
@@ -206,25 +188,6 @@ FORMS: Mapping[str, Form] = {
     "ros-json": Form("ros-json", "log.jsonl", "", _ros_json),
     "ros-tf": Form("ros-json", "log.json", "", _ros_tf),
 }
-"""Every way in which a log may be written."""
-SAID: Mapping[str, str] = {
-    "csv-wxyz": "quaternions by the names of their columns, mm",
-    "csv-xyzw": "quaternions `q0` to `q3` in the order x, y, z, w, m",
-    "csv-files": "quaternions by the names of their columns, mm, no ids, one file per object",
-    "csv-rotvec": "rotation vectors, deg, mm",
-    "csv-axis": "axis and angle, deg, cm",
-    "csv-euler": "Euler angles about moving axes z, y, x, rad, m",
-    "csv-rpy": "roll, pitch and yaw about fixed axes, deg, mm",
-    "csv-matrix": "matrices `r11` to `r33`, mm",
-    "csv-ms": "matrices `m00` to `m22`, m, times in ms",
-    "bop": "results of BOP, images by their numbers",
-    "tum": "one file per object",
-    "ros-csv": "`TransformStamped`, seconds and nanoseconds",
-    "ros-csv-files": "`PoseStamped`, one file per object, nanoseconds",
-    "ros-json": "`PoseStamped`, one message per line, topics are ids",
-    "ros-tf": "a list of `TFMessage`",
-}
-"""What each is, for a reader."""
 
 
 def _axis(R: Rotation) -> Array:
@@ -232,32 +195,3 @@ def _axis(R: Rotation) -> Array:
     vector = R.as_rotvec()
     angle = float(np.linalg.norm(vector))
     return np.array([*(vector / angle if angle else (1.0, 0.0, 0.0)), np.degrees(angle)])
-
-
-def known_text(starts: Mapping[str, Array | None]) -> dict[str, str]:
-    """Known places as a camera file states them; None: where the scenario starts the part."""
-    said = {}
-    for part, T in starts.items():
-        said[part] = '"start"'
-        if T is not None:
-            packed = pose.pack(T)
-            at, q = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (packed[:3] * 1e3, packed[3:]))
-            said[part] = f"{{ at_mm = [{at}], quaternion_wxyz = [{q}] }}"
-    return said
-
-
-def write_recording(
-    form: Form, found: Mapping[str, Tracked], starts: Mapping[str, Array | None], folder: Path, stays: float | None
-) -> Path:
-    """Write a log with its camera.toml and objects.toml; returns the log.
-
-    Args:
-        starts: Part -> where it begins, (4, 4), world, [m]; None: where the scenario starts it.
-        stays: Standard deviation of the error that stays, mm and degrees; None: it is not stated.
-    """
-    topics = form.write is _ros_json
-    ids = {part: one._replace(id=f"tracker/{one.id}") if topics else one for part, one in found.items()}
-    form.write(found, folder / form.file)
-    (folder / "camera.toml").write_text(camera_text(form.log, known_text(starts), stays), encoding="utf-8")
-    (folder / "objects.toml").write_text(objects_text(ids), encoding="utf-8")
-    return folder / form.file

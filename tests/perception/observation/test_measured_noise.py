@@ -212,7 +212,7 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
 def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     measured, camera = read_noise(presets()["megapose-lmo"])
-    path.write_text(noise_text(measured, ("a note",), pose.at((0, 0, 1.5), (180, 0, 0))))
+    path.write_text(noise_text(measured, ("a note",)) + "[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
     noise = make_noise(str(path), NOISE_LEVEL)
     assert isinstance(noise, Fitted)
     assert noise.measured == measured

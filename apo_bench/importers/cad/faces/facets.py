@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 FEWEST_SIDES = 12
 """The smallest number of flat pieces in a whole turn of a round face."""

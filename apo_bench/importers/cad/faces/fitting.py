@@ -7,8 +7,7 @@ from scipy.optimize import least_squares
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, square_to
 
 _MOST_POINTS = 400
 _TURNED = 0.09
@@ -42,17 +41,17 @@ class Round(NamedTuple):
         return height, distance, out / np.maximum(distance, 1e-300)[:, None]
 
     def off(self, points: Array) -> Array:
-        """How far points are outside of it, square to its wall, (k,)."""
+        """Return how far points are outside of it, square to its wall, (k,)."""
         height, distance, _ = self.polar(points)
         return (distance - self.radius - self.slope * height) / np.hypot(1.0, self.slope)
 
     def normals(self, out: Array) -> Array:
-        """Outward normals where the way from the axis is `out`, (k, 3)."""
+        """Return outward normals where the way from the axis is `out`, (k, 3)."""
         return (out - self.slope * self.axis) / np.hypot(1.0, self.slope)
 
 
 def circle_through(points: Array, axis: Array) -> Round | None:
-    """The cylinder along an axis nearest to points."""
+    """Return the cylinder along an axis nearest to points."""
     x, y = square_to(axis)
     middle = points.mean(axis=0)
     u = (points - middle) @ x
@@ -71,7 +70,7 @@ def circle_through(points: Array, axis: Array) -> Round | None:
 
 
 def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None:
-    """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt.
+    """Return the wall nearest to points by least squares: distances square to the wall, Levenberg-Marquardt.
 
     None: there is no start, there are too few points, or nothing fits.
     """
@@ -109,7 +108,7 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
 
 
 def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float) -> tuple[Any, bool, Array]:
-    """Which flat pieces lie on a round surface.
+    """Return which flat pieces lie on a round surface.
 
     Args:
         among: The pieces to measure, ascending.
@@ -150,13 +149,13 @@ def facets_on(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: fl
 
 
 def axis_of(normals: Array, cone: bool) -> Array:
-    """The direction to which normals are square, or have one angle: that in which they differ least."""
+    """Return the direction to which normals are square, or have one angle: that in which they differ least."""
     rows = normals - normals.mean(axis=0) if cone else normals
     return np.asarray(np.linalg.svd(rows, full_matrices=len(rows) < 3)[2][2])
 
 
 def fit_plane(mesh: Mesh, triangles: Any) -> Region:
-    """The plane nearest to triangles that lie in one."""
+    """Return the plane nearest to triangles that lie in one."""
     n = mesh.across[triangles].sum(axis=0)
     n = _snap(n / np.linalg.norm(n))
     middle = mesh.corners[mesh.triangles[triangles]].mean(axis=1)
@@ -165,13 +164,13 @@ def fit_plane(mesh: Mesh, triangles: Any) -> Region:
 
 
 def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
-    """Triangles on the plane through a point."""
+    """Return triangles on the plane through a point."""
     n = _snap(normal / np.linalg.norm(normal))
     return Region("plane", triangles, direction=n, point=float(point @ n) * n)
 
 
 def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
-    """Triangles on a cylinder or a cone, with the ends of it."""
+    """Return triangles on a cylinder or a cone, with the ends of it."""
     # An axis has no sense of its own: its largest component is taken as positive, and its point is the foot of the
     # origin, so that one file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
@@ -205,7 +204,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
 
 
 def turn_of(mesh: Mesh, triangles: Any, wall: Round) -> float:
-    """How far around its axis a wall reaches, as its triangles lie there, [rad]."""
+    """Return how far around its axis a wall reaches, as its triangles lie there, [rad]."""
     x, y = square_to(wall.axis)
     _, distance, out = wall.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
     angle = np.arctan2(out @ y, out @ x).reshape(-1, 3)
@@ -232,7 +231,7 @@ def _snap(n: Array) -> Array:
 
 
 def border_of(mesh: Mesh, triangles: Any) -> Any:
-    """Corners on the border of a region."""
+    """Return corners on the border of a region."""
     inside = np.zeros(len(mesh.triangles), dtype=bool)
     inside[triangles] = True
     return np.unique(mesh.edges[inside[mesh.neighbours].sum(axis=1) == 1])

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
 from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, facets_on, refine_round
-from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 _FEWEST = 3
 """Flat pieces of a round face."""

@@ -8,8 +8,7 @@ from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
 from apo_bench.importers.cad.faces.fitting import fit_plane, round_region
 from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_groups
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, square_to
 
 _LARGER = 8.0
 """A flat piece that is larger by this factor than most of its neighbours on a free surface is a plane next to it."""
@@ -38,7 +37,7 @@ class _End(NamedTuple):
 
 
 def find_regions(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
-    """The faces of a closed mesh, in an order that its triangles give.
+    """Return the faces of a closed mesh, in an order that its triangles give.
 
     Args:
         fewest: Sides of a whole turn of a round face; a wall with fewer sides is flat faces.

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from apo_bench.importers.cad.solids.mesh import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, connected_groups
 
 SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
 
 
 def merge_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
-    """The mesh with near corners as the first of them, and which of its triangles, (t,), have three corners then."""
+    """Merge near corners into the first of them; return the mesh, and which triangles, (t,), keep three corners."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
     _, group = connected_groups(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
     first = np.unique(group, return_index=True)[1]

@@ -9,7 +9,7 @@ from apo_bench.errors import require
 from apo_bench.importers.cad.meshes.obj import read_obj
 from apo_bench.importers.cad.meshes.stl import read_stl
 from apo_bench.importers.cad.meshes.three_mf import read_3mf
-from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids import Mesh
 from apo_bench.io import read_bytes
 
 _SUFFIXES = (".stl", ".obj", ".3mf")

@@ -11,8 +11,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import square_to
+from apo_bench.importers.cad.solids import Mesh, square_to
 
 _SAME_AREA = 1e-6
 """Triangles cover a polygon once if their areas add up to its area within this part."""

@@ -9,9 +9,16 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
-from apo_bench.importers.cad.solids.bodies import body_of, mesh_of, simplify
-from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, connected_groups
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.importers.cad.solids import (
+    Mesh,
+    RawSolid,
+    SolidPlace,
+    body_of,
+    concatenate_meshes,
+    connected_groups,
+    mesh_of,
+    simplify,
+)
 
 _MOST_SHELLS = 200
 _THINNEST = 1e-6

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids import Mesh
 
 _HEADER = 84
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])

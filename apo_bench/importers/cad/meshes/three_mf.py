@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids.mesh import Mesh
+from apo_bench.importers.cad.solids import Mesh
 
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
 _LARGEST_BYTES = 60_000_000

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, square_to
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, square_to
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300
@@ -32,13 +32,13 @@ _LEFT_MM = 0.02
 
 
 def corners_of(body: Any) -> Array:
-    """Of a body of manifold3d, (k, 3)."""
+    """Return the corners of a body of manifold3d, (k, 3)."""
     raw = body.to_mesh64()
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
 def hull_corners(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
-    """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
+    """Return the corners of the hull of points, each once; of too many the farthest, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
@@ -96,7 +96,7 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
 
 
 def merge_near_points(points: Array) -> Array:
-    """Points without those that are near to an earlier one."""
+    """Return points without those that are near to an earlier one."""
     return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
 
 

@@ -7,19 +7,19 @@ import numpy as np
 from apo_bench.geometry import Array
 
 SLIVER = 1e-7
-"""What is less than this part of a solid is rounding."""
+"""A smaller share of a solid is rounding."""
 
 
 class CutPart(NamedTuple):
     """A part of a solid that is to be one piece."""
 
     body: Any
-    """As manifold3d has it."""
+    """Of manifold3d."""
     planes: Array
     """Along which it was cut, (k, 4)."""
 
     def halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
-        """What is above and below the plane n . x = d, both a hair's breadth off it.
+        """Return the halves above and below the plane n . x = d, both a hair's breadth off it.
 
         On the plane, rounding would leave flaps of no thickness.
         """
@@ -29,13 +29,13 @@ class CutPart(NamedTuple):
 
 
 def bodies_of(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
-    """The bodies that halves consist of, less those of so little volume, [mm^3]."""
+    """Return the connected bodies of halves, without those of less volume, [mm^3]."""
     every = (CutPart(body, half.planes) for half in halves for body in half.body.decompose())
     return [each for each in every if each.body.volume() > least]
 
 
 def cut_through(part: CutPart, point: Array, normals: Array, least: float, hair: float) -> list[CutPart]:
-    """The bodies of a part cut through a point along the plane that leaves the least hulls; the part if none does.
+    """Cut a part through a point along the plane that leaves the least hulls; return the part alone if none does.
 
     Args:
         normals: Of the planes to try, (k, 3).

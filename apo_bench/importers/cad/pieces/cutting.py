@@ -11,11 +11,10 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
 from apo_bench.importers.cad.pieces.halving import convex_parts, cut_at_shoulders, snap_to_planes
+from apo_bench.importers.cad.pieces.holes import bore_piece, least_pieces
 from apo_bench.importers.cad.pieces.refining import Beside
-from apo_bench.importers.cad.pieces.round_walls import as_cylinders, bore_piece, least_pieces, round_shafts
-from apo_bench.importers.cad.solids.bodies import body_of
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.pieces.shafts import as_cylinders, round_shafts
+from apo_bench.importers.cad.solids import RawSolid, Region, body_of
 from apo_bench.scenario.parts.allowed import MOST_PIECES
 from apo_bench.scenario.parts.checking import touching_groups
 

@@ -9,8 +9,7 @@ from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.importers.cad.pieces.refining import Beside, refine
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Region, mesh_of
 
 _MOST_CUTS = 400
 _TRIES = 6
@@ -24,7 +23,7 @@ _FINE_TRIANGLES = 4000  # of a shape that is simplified before
 
 
 def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
-    """Parts that are convex, or that stand for a hollow free shape with their hull."""
+    """Return parts that are convex, or that stand for a hollow free shape with their hull."""
     volume = solid.volume()
     yield from refine(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
 
@@ -109,7 +108,7 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
 
 
 def cut_at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
-    """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
+    """Cut parts where one round wall meets another one: a cylinder and its chamfer are two pieces."""
     for part in parts:
         # So many corners of a part are on the wall of a shaft that it is one.
         corners = corners_of(part.body)
@@ -129,7 +128,7 @@ def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]
 
 
 def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
-    """Corners that are a hair's breadth off the planes of cuts, on them."""
+    """Move corners that are a hair's breadth off the planes of cuts onto them."""
     corners = corners.copy()
     # A corner on two or three planes is brought onto them in turns, as each step leaves the other ones a little.
     for _ in range(4):

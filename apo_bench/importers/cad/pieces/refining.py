@@ -14,9 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.solids.bodies import mesh_of
-from apo_bench.importers.cad.solids.mesh import Mesh
-from apo_bench.importers.cad.solids.region import square_to
+from apo_bench.importers.cad.solids import Mesh, mesh_of, square_to
 
 _DEEP_MM = 0.02
 """How deep the surface may lie in a hull where other solids come near."""

@@ -45,7 +45,7 @@ class RawSolid:
 
 
 def merge_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
-    """Solids of different shape, each with the places of all that are the same."""
+    """Return solids of different shape, each with the places of all that are the same."""
     different: list[RawSolid] = []
     for new in solids:
         for i, old in enumerate(different):

@@ -14,7 +14,7 @@ SAME_CORNER_MM = 2e-4
 
 
 def square_to(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors square to a unit vector z: x from the frame's axis that is farthest from z, y = z x x."""
+    """Return two unit vectors square to a unit vector z: x from the frame's axis that is farthest from z, y = z x x."""
     x = np.eye(3)[int(np.abs(direction).argmin())]
     x = x - (x @ direction) * direction
     x /= np.linalg.norm(x)
@@ -78,7 +78,7 @@ class Region:
         return np.array([self.ends.min(axis=0) - reach, self.ends.max(axis=0) + reach])
 
     def polar(self, points: Array) -> tuple[Array, Array, Array]:
-        """Height along the axis, distance from it, angle around it, of points (k, 3)."""
+        """Return height along the axis, distance from it, angle around it, of points (k, 3)."""
         x, y = self.across
         off = points - self.point
         return off @ self.direction, np.hypot(off @ x, off @ y), np.arctan2(off @ y, off @ x)
@@ -87,12 +87,12 @@ class Region:
         return self.radii[0] + self.slope * (height - self.span[0])
 
     def is_on_wall(self, points: Array, near: float) -> Any:
-        """Which points, (k, 3), are this near to the wall, between its ends."""
+        """Return which points, (k, 3), are this near to the wall, between its ends."""
         height, distance, _ = self.polar(points)
         within = (height > self.span[0] - SAME_CORNER_MM) & (height < self.span[1] + SAME_CORNER_MM)
         return within & (np.abs(distance - self.radius_at(height)) < near)
 
     def around(self, height: float, radius: float, angle: Array) -> Array:
-        """Points at angles around the axis, (k, 3)."""
+        """Return points at angles around the axis, (k, 3)."""
         x, y = self.across
         return self.point + height * self.direction + radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))

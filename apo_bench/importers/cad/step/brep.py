@@ -9,7 +9,7 @@ from OCP import Bnd, BRep, BRepAdaptor, BRepBndLib, BRepMesh, ShapeAnalysis, Top
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.solids.raw_solid import SolidPlace
+from apo_bench.importers.cad.solids import SolidPlace
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.importers.cad.step.tree import matrix_of, read_leaves
 

@@ -11,10 +11,7 @@ from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
 from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
-from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, connected_groups
-from apo_bench.importers.cad.solids.naming import name_regions
-from apo_bench.importers.cad.solids.raw_solid import RawSolid
-from apo_bench.importers.cad.solids.region import Region
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, concatenate_meshes, connected_groups, name_regions
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane, is_same_surface
 
 _LEVEL = 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.importers.cad.meshes.mesh_file import CadFile, check_size, check_triangles, read_cad_bytes
-from apo_bench.importers.cad.solids.raw_solid import RawSolid, merge_copies
+from apo_bench.importers.cad.solids import RawSolid, merge_copies
 from apo_bench.importers.cad.step.from_brep import raw_of
 
 STEP_SUFFIXES = (".step", ".stp")

@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.solids.raw_solid import SolidPlace
+from apo_bench.importers.cad.solids import SolidPlace
 
 _SAME = 1e-6
 """Surfaces that differ by less, as a share of the size of the solid, are one."""

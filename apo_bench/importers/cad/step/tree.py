@@ -11,7 +11,7 @@ from OCP import TDF, IFSelect, Quantity, STEPCAFControl, TCollection, TDataStd, 
 from OCP import collections as sequences
 
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids.raw_solid import Rgb, SolidPlace
+from apo_bench.importers.cad.solids import Rgb, SolidPlace
 
 _NO_NAME = re.compile(
     r"|=>\[.*|NAUO\d*|\d+|SOLID|SHELL|COMPOUND|Next assembly (usage|relationship)|Open CASCADE STEP translator.*",

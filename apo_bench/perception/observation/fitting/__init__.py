@@ -1,1 +1,1 @@
-"""Noise measured of a pose estimator: from residuals to a noise file."""
+"""Noise models fitted to the residuals of a pose estimator."""

@@ -1,4 +1,4 @@
-"""Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses."""
+"""Fit a noise model to residuals: tails by maximum likelihood, rates of outliers and of misses."""
 
 from collections.abc import Callable
 from typing import NamedTuple

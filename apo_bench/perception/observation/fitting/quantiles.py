@@ -1,4 +1,4 @@
-"""Tails from published quantiles, where the estimates themselves are not published."""
+"""Fit tails to published quantiles, where the estimates themselves are not published."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Noise models, one a file: what a camera makes of the true poses."""
+"""Noise models, one a file."""
 
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import floor_covariance, with_shared

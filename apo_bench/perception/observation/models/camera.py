@@ -1,4 +1,4 @@
-"""A camera, and errors along and across the rays on which it sees parts.
+"""A camera: the frames of the rays on which it sees parts.
 
 The camera's axes are those of OpenCV: x to the right, y down, z along the optical axis. The frame of a ray is that of
 the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).

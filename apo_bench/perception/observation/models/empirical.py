@@ -1,4 +1,4 @@
-"""Noise that draws from the residuals of a pose estimator themselves; `noise fit --residuals` writes a file of them."""
+"""Noise that draws from the residuals of a pose estimator."""
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""What every noise model has: its level, and facts for its card."""
+"""The level of a noise model, and the facts for its sheet."""
 
 from typing import NamedTuple
 

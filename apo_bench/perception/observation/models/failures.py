@@ -1,4 +1,4 @@
-"""How cameras fail: some operations are seen where their part is not, with the covariance of a right pose.
+"""Noise with failures of the camera: some poses are false, with the covariance of right ones.
 
 What is false is drawn apart from the noise, so that a later look can repeat it: a model keeps no state.
 """

@@ -1,4 +1,4 @@
-"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers.
+"""Noise with the tails, outliers and misses that were fitted to a pose estimator.
 
 It is drawn, or stated of an observation that a camera of this noise has made.
 """

@@ -1,4 +1,4 @@
-"""Noise that is the same in every direction: Gaussian, with a factor of its own for each part, or with heavy tails."""
+"""Noise that is the same in every direction: Gaussian, with a factor for each part, or with heavy tails."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+"""Noise with gross outliers and missed operations."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
@@ -26,7 +26,7 @@ class Outliers:
     """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
     What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
-    it is wrong; `inflation` says how much larger the covariance of all errors is. Shares do not depend on the level:
+    it is wrong. Shares do not depend on the level:
     the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
     """
 
@@ -54,11 +54,6 @@ class Outliers:
             "At level 0 nothing is missed",
         ),
     )
-
-    @property
-    def inflation(self) -> float:
-        """Covariance of the errors of all that is seen, over the one that is stated."""
-        return 1.0 + self.outliers * (self.times**2 - 1.0)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.noise_level.sigma()

@@ -1,4 +1,4 @@
-"""How far estimates are from the truth, in the frames of the rays on which a camera saw the parts."""
+"""Residuals of a pose estimator in the frames of the rays of its camera."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

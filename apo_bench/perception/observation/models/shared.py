@@ -1,4 +1,4 @@
-"""Noise whose errors operations share: of the model of a part, of the pose of the camera, and of drift."""
+"""Noise with errors that operations share: of a part model, of the camera pose, or of drift."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, final

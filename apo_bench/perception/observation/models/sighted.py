@@ -1,4 +1,4 @@
-"""Noise of a camera that is worse along its line of sight: infinitely far away, or at a place of its own."""
+"""Noise of a camera that is worse along its line of sight."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, final

@@ -1,4 +1,4 @@
-"""Noise for parts that look the same when turned: which of the equal poses is reported, and how well it is known."""
+"""Noise of parts that look the same when turned."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, final

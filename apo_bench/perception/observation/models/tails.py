@@ -1,4 +1,4 @@
-"""Errors across a ray and along it: independent Student t, and none larger than a limit.
+"""The distribution of errors across a ray and along it: independent Student t, within a limit.
 
 Across there are two directions alike, along there is one. The same form serves for shifts [mm] and for turns [deg]
 (about axes across the ray, and about the ray). All integrals over the limited region are taken along the ray, by Gauss

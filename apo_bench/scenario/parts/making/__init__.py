@@ -1,4 +1,4 @@
-"""Parts built from outlines, bores and shafts, and written as part files; lengths in mm."""
+"""Parts from outlines, bores and shafts; lengths in mm."""
 
 from apo_bench.scenario.parts.making.body import Body, join
 from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude

@@ -1,4 +1,4 @@
-"""Bodies as they are built: convex pieces, faces and exact moments, in [m]; and what becomes of them side by side."""
+"""Bodies: convex pieces, faces and exact moments, in [m]."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Flat areas cut into convex ones: exactly, along their own corners; around bores; behind walls that recede."""
+"""Cut flat areas into convex ones."""
 
 from typing import Any
 

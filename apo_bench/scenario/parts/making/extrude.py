@@ -1,4 +1,4 @@
-"""Prisms over flat outlines, with holes of any outline and with round bores along the way of the extrusion."""
+"""Extrude outlines with holes and bores into prisms."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

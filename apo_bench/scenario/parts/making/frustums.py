@@ -1,4 +1,4 @@
-"""Lengths of bores and shafts: how wide they are, from where to where along their axis."""
+"""Frustums: the lengths of a bore or a shaft along its axis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Volume, centroid and inertia of exact shapes: moments up to the second, which add up."""
+"""Moments of exact shapes up to the second: volume, centroid and inertia."""
 
 from collections.abc import Iterable
 from functools import reduce

@@ -1,4 +1,4 @@
-"""Flat outlines of lines and arcs, [mm]: as rings of corners, and their exact moments."""
+"""Flat outlines of lines and arcs, [mm]."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -109,16 +109,11 @@ def slot(
 
 
 @check_arguments
-def round_corners(
-    outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None
-) -> Outline:
-    """An outline of straight sides with corners, else all, rounded."""
+def round_corners(outline: Outline, radius: float, sides: int | None = None) -> Outline:
+    """Round the corners of an outline of straight sides."""
     edges: list[Edge] = []
     points = np.array([edge.start for edge in outline])
     for i, edge in enumerate(outline):
-        if corners is not None and i not in corners:
-            edges.append(edge)
-            continue
         into = points[i] - points[i - 1]
         out = points[(i + 1) % len(points)] - points[i]
         into = into / np.linalg.norm(into)

@@ -1,4 +1,4 @@
-"""Bodies of revolution: shafts with chamfers, discs and bushes with bores, cones."""
+"""Bodies of revolution."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -33,7 +33,6 @@ def revolve(
     inner: Sequence[Frustum] = (),
     *,
     flats: Mapping[float, str] | None = None,
-    fit: Sequence[str] = (),
 ) -> Body:
     """A body of revolution about z, [mm].
 
@@ -44,7 +43,6 @@ def revolve(
         outer: Its lengths, one after the other.
         inner: Those of its bore, inside of the outer ones.
         flats: Height -> name of the flat face there: ends, shoulders, the bottom of a blind bore.
-        fit: Which flat faces, by name, recede by the clearance.
     """
     heights = heights_of((*outer, *inner))
     moments = sum_moments(outer[0].moments(), (step.moments() for step in outer[1:]))
@@ -52,7 +50,7 @@ def revolve(
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(
         tuple(pieces),
-        tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""), fit)),
+        tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""))),
         tuple(rounds),
         subtract_steps(moments, inner).in_metres,
     )
@@ -104,9 +102,7 @@ def _ring(radius: float, sides: int, z: float) -> Array:
     return raise_to(inscribe_polygon((0.0, 0.0), radius, sides), z)
 
 
-def _flats(
-    outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str, fit: Sequence[str]
-) -> Iterator[Face]:
+def _flats(outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str) -> Iterator[Face]:
     """The rings that look up or down at a height: what is full below and not above, or above and not below."""
     areas = []
     for above in (False, True):
@@ -120,4 +116,4 @@ def _flats(
         for polygon in polygons_of(rest):
             if not polygon.buffer(-_NARROW_MM / 2).is_empty:
                 outline, *holes = rings_of(polygon, 1.0)
-                yield flat_face(name, outline, [hole[::-1] for hole in holes], z, up, name in fit and bool(name))
+                yield flat_face(name, outline, [hole[::-1] for hole in holes], z, up)

@@ -1,4 +1,4 @@
-"""Bodies that were built become solids, and part files that are read as these solids again."""
+"""Write bodies as part files."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,0 +1,97 @@
+"""Cut round holes out of convex pieces, as wedges that touch the wall from outside, [mm]."""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Any
+
+import manifold3d
+import numpy as np
+from shapely import MultiPoint, Point
+
+from apo_bench.geometry import Array, sides_of
+from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
+
+
+def least_pieces(bores: Sequence[Region]) -> int:
+    """Return the smallest number of wedges around round holes."""
+    return sum(sides_of(1e-3 * max(bore.radii)) for bore in bores)
+
+
+def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
+    """Cut holes out of a convex piece, until there are too many pieces; return the convex pieces.
+
+    Args:
+        most: The largest number of pieces.
+    """
+    parts = [manifold3d.Manifold.hull_points(corners)]
+    bores = [bore for bore in bores if _meets(parts[0], bore)]
+    if not bores:
+        return [corners]
+    # First halfway between holes side by side, so that wedges around one do not run through the other one.
+    for a, b in combinations(bores, 2):
+        plane = _between(a, b)
+        if plane is not None:
+            parts = [
+                half
+                for part in parts
+                for half in (part.split_by_plane(*plane) if _meets(part, a) and _meets(part, b) else (part,))
+            ]
+    for bore in bores:
+        if len(parts) > most:
+            break
+        parts = [piece for part in parts for piece in (_around(part, bore) if _meets(part, bore) else (part,))]
+    points = [merge_near_points(corners_of(part)) for part in parts if not part.is_empty()]
+    return [hull_corners(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
+
+
+def _between(a: Region, b: Region) -> tuple[Array, float] | None:
+    """The plane n . x = d between two holes side by side."""
+    if np.linalg.norm(np.cross(a.direction, b.direction)) > 1e-6:
+        return None
+    off = b.point - a.point
+    off = off - off @ a.direction * a.direction
+    gap = float(np.linalg.norm(off))
+    # Parallel axes: the plane is square to the shortest way between them, in the middle between the walls.
+    room = gap - max(a.radii) - max(b.radii)
+    return (off / gap, float(off / gap @ a.point + max(a.radii) + room / 2.0)) if room > 0.0 else None
+
+
+def _meets(part: Any, bore: Region) -> bool:
+    """Whether a part, seen along the axis of a hole, comes near to the hole."""
+    if part.is_empty():
+        return False
+    low, high = np.array(part.bounding_box()).reshape(2, 3)
+    if (low > bore.box[1]).any() or (high < bore.box[0]).any():
+        return False
+    corners = corners_of(part)
+    height, _, _ = bore.polar(corners)
+    if height.max() < bore.span[0] + SAME_CORNER_MM or height.min() > bore.span[1] - SAME_CORNER_MM:
+        return False
+    # Seen along the axis a convex part is the hull of its corners, and the axis is the origin.
+    flat = (corners - bore.point) @ np.column_stack(bore.across)
+    return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_CORNER_MM)
+
+
+def _around(part: Any, bore: Region) -> Iterator[Any]:
+    """A convex part less a round hole: what is below and above it, and wedges that touch its wall from outside."""
+    axis = bore.direction
+    x, y = bore.across
+    foot = float(bore.point @ axis)
+    above, rest = part.split_by_plane(axis, foot + bore.span[1])
+    slab, below = rest.split_by_plane(axis, foot + bore.span[0])
+    yield from (each for each in (above, below) if not each.is_empty())
+    n = sides_of(1e-3 * max(bore.radii))
+    slope = bore.slope if bore.kind == "cone" else 0.0
+    at = bore.point + bore.span[0] * axis
+    for i in range(n):
+        # A wedge lies between the half planes at angles a and b, and beyond the plane that touches the wall at m
+        # between them: its normal leans back against the axis by the slope of a cone.
+        a, b, m = (2.0 * np.pi * (i + off) / n for off in (-0.5, 0.5, 0.0))
+        right = -np.sin(a) * x + np.cos(a) * y
+        left = np.sin(b) * x - np.cos(b) * y
+        wall = np.cos(m) * x + np.sin(m) * y - slope * axis
+        wedge = slab.trim_by_plane(right, float(right @ at)).trim_by_plane(left, float(left @ at))
+        wedge = wedge.trim_by_plane(wall, float((wall @ at + bore.radii[0]) / np.linalg.norm(wall)))
+        if not wedge.is_empty():
+            yield wedge
