@@ -235,11 +235,6 @@ REQUIRED = (
 """Columns without which a line is no record; other columns that are missing are null."""
 
 
-def look_up(row: TrialRecord, column: str) -> Any:
-    """What a row says in a column that is not named where this is written."""
-    return row.get(column)
-
-
 def finite(x: float | None) -> float | None:
     """A number that a row can hold, else null."""
     return float(x) if x is not None and abs(x) <= LARGEST_NUMBER else None

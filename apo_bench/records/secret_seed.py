@@ -70,8 +70,8 @@ def secret_seed_of_sweep(path: str | Path, folder: str | Path) -> SecretSeed:
     trials = Path(folder) / "trials.jsonl"
     require(
         not trials.exists() or trials.stat().st_size <= 0,
-        f"the secret seed file '{path}' is not there, and '{folder}' holds trials already; give the secret seed file that they "
-        "were drawn with, or choose another folder.",
+        f"the secret seed file '{path}' is not there, and '{folder}' holds trials already; give the file that they were "
+        "drawn with, or choose another folder.",
     )
     make_secret_seed(Path(path))
     return read_secret_seed(path)
@@ -103,7 +103,8 @@ def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:
     hashes = sorted({row.get("secret_seed") or "" for row in rows})
     require(
         len(hashes) <= 1,
-        f"the records were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one secret seed at a time.",
+        f"the records were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one secret seed at "
+        "a time.",
     )
     return hashes[0] or None if hashes else None
 

@@ -1,7 +1,7 @@
-"""The plan of a correction, with its free directions chosen so that it fits: foretold to fit, stable, in reach.
+"""Move the plan of a correction along its free directions so that it fits: predicted to fit, stable, in reach.
 
-A plan that fits is left as it is. So is one whose contacts are off, which no free direction mends, and one for which
-no choice was found. What is believed of contacts is what the corrector was told.
+A plan that fits stays as it is. So does one whose contacts are off, which no free direction repairs, and one for which
+no choice is found. The contacts are those that the corrector was given.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.free_directions import free_space, nearest_fitting
 
 ROOMS_MM = (2.0, 0.5)
-"""Parts that would have met are planned this far apart, and parts that would fall this far from the edge; the second
-where the first cannot be."""
+"""Distance between parts that would meet, and from the edge over which a part would fall; the second if the first is
+not possible."""
 _SLACK = 0.01
-"""What had less room than that keeps it, but for so much [mm]."""
+"""Tolerance of a smaller distance that a part had before [mm]."""
 _ROOMY = ("on_way", "from_above")
 """Measures of the room between parts."""
 _EXACT_M = 1e-9
-"""Contacts that hold this well hold as before."""
+"""Contacts with a smaller gap hold as before."""
 _LEAST_MM = 0.01
 _LEAST_DEG = 0.01
 """Operations that move by less are not named."""
 
 
 class FreeMove(NamedTuple):
-    """How far the goal of an operation was moved along what contacts leave free."""
+    """How far the target pose of an operation was moved along what contacts leave free."""
 
     operation: int
     """Counted from 0."""
@@ -47,13 +47,13 @@ class FreeMove(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class FittingPlan:
-    """A plan, and what of it was chosen so that it fits."""
+    """A plan, and how it was moved so that it fits."""
 
     plan: Plan
     moves: tuple[FreeMove, ...] = ()
-    """The goals that are not as the corrector left them, in the order of operations."""
+    """The poses that differ from the correction, in the order of operations."""
     why: str = ""
-    """What would have failed without; empty if nothing was moved."""
+    """What fails otherwise; empty if nothing was moved."""
 
     @property
     def sentence(self) -> str:
@@ -70,7 +70,7 @@ class FittingPlan:
 
 @check_arguments
 def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
-    """What the robot is to do after a correction, with free directions chosen so that it fits.
+    """Plan a correction, moved along free directions so that it fits.
 
     Args:
         observation: What the corrector was given.

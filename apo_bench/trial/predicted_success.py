@@ -1,12 +1,12 @@
-"""How likely a plan is to succeed, said before anything moves, by whoever knows only what the planner knew.
+"""Predicted success probability of a plan, before anything moves, from what the planner knows.
 
-Every explanation that a corrector kept says where things may truly be. Truths are drawn from them, in proportion to
-their weights, along what contacts leave free; and robots, from the errors that are stated of the robot. Of each draw it
-is asked how far the plan is from failing: whether what would be brought there fits (the measures of `prediction`), and
-whether faces overlap as the judge asks if that draw is the truth. The mean over the draws is the *score*; a table that
-was made of other assemblies says how often plans with such a score succeeded.
+Every explanation that a corrector kept states where things may truly be. Truths are drawn from them, in proportion to
+their weights, along directions that contacts leave free; robots are drawn from the stated errors of the robot. Each
+draw measures how far the plan is from failing: whether what is brought there fits (the measures of `prediction`), and
+whether faces overlap as the judge requires if that draw is the truth. The mean over the draws is the *score*; a table
+of other assemblies gives the share of plans with such a score that succeeded.
 
-A simulator is asked only for a scene, for what its arm reaches and where a robot with errors brings things.
+A simulator only gives a scene, the reach of its arm, and the poses to which a robot with errors brings parts.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ TRUTHS = 16
 ROBOTS = 16
 """Draws of the truth and, where the robot has stated errors, of those."""
 _STREAM = 2_030
-"""Of the draws of a promise, the same for every plan: no trial has streams of that many words."""
+"""Stream of the draws, the same for every plan; no trial uses it."""
 _SLACK_MM = 0.05
 """Standard deviation of what a measure leaves out: sag, rest, compliance."""
 _SLACK_SHARE = 0.1
 """The same of an overlap."""
 _FARTHEST_M = 0.02
 _FARTHEST_RAD = 0.5
-"""A truth is drawn no further along a free direction of which nothing is known, one standard deviation."""
+"""Largest standard deviation of a draw along a free direction of which nothing is known."""
 _FALLS = 0.02
 """How near to fitting a plan is in which a part would fall or lean."""
 _LEVEL = 0.5
-"""A way in is level if its cosine with the vertical is smaller: no weight helps there, and the play is all there is."""
+"""An insertion axis is level if its cosine with the vertical is smaller: no weight helps there, only the play."""
 _WEIGHED = ("falls", "leans")
 _UNKNOWN = 0.5
 """The share where no truth could be drawn at which faces meet."""
@@ -57,7 +57,7 @@ _LEAST_WEIGHT = 0.01
 
 
 class Explanation(NamedTuple):
-    """What may be so, and how likely that is; what all of them leave to 1 is that of nothing that was thought of."""
+    """What may be true, and how likely that is; the weights sum to 1 at most."""
 
     weight: float
     believed: Observation
@@ -65,14 +65,14 @@ class Explanation(NamedTuple):
     """(n, 4, 4), world frame, [m]."""
     dropped: tuple[str, ...] = ()
     turned: bool = False
-    """Which way all of it is turned on the table is not known, since nothing was seen."""
+    """Whether the turn of the assembly on the table is unknown, since nothing was observed."""
 
 
 def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[Explanation, ...]:
-    """Those that a corrector kept; of one that keeps none, and of no corrector, that what it believed is so.
+    """Those that a corrector kept; without any, its estimate alone.
 
     Args:
-        believed: What the corrector was given.
+        believed: The observation that the corrector was given.
         goals: (n, 4, 4), of the plan.
     """
     blind = not believed.observed.any()
@@ -98,12 +98,12 @@ def predict_success(
 
     Args:
         plan: With the contacts that the planner was given.
-        believed: What the planner was given: what was seen, with the contacts that it was told.
-        correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
-        where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
-        robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
-        searches: The robot feels for a hole where a motion into it is stopped, as one with `+probe` does too.
-        feels: The robot touches first, and makes up for its errors: what is left is how parts slip in its hand.
+        believed: The observation that the planner was given, with its contacts.
+        correction: The correction of it; None without a corrector.
+        where: What the plan is executed in. In a scenario, everything counts as in reach.
+        robot_error: The stated errors of the robot, as in records; a scenario does not use them.
+        spiral: The robot searches for a hole in a spiral where a motion into it is stopped.
+        probing: The robot probes first and compensates its errors: only the slip of parts in its hand is left.
     """
     explained = explanations(correction, believed, plan.target_poses)
     score = plan_score(plan, explained, where, robot_error, spiral, probing)
@@ -126,11 +126,11 @@ def plan_score(
     spiral: bool = False,
     probing: bool = False,
 ) -> float:
-    """How near to certain it is that a plan fits, from 0 to 1: what the table turns into a probability.
+    """The score of a plan, from 0 to 1, which the table turns into a probability.
 
     Args:
         plan: With the contacts that the planner was given.
-        where, robot_error, searches, feels: As in `promised_success`.
+        where, robot_error, spiral, probing: As in `predict_success`.
     """
     ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, spiral, probing)
     if any(move.refused is not None for move in arm):
@@ -142,7 +142,7 @@ def plan_score(
         assembly = _without(plan.assembly, each.dropped)
         if each.dropped not in fits:
             fits[each.dropped] = _fit_share(replace(plan, assembly=assembly), where, arm, ends)
-        truths = drawn_truths(each, max(1, round(TRUTHS * each.weight)), rng)
+        truths = draw_truths(each, max(1, round(TRUTHS * each.weight)), rng)
         score += each.weight * fits[each.dropped] * _cover_share(replace(plan, assembly=assembly), truths, where)
     return score
 
@@ -150,7 +150,7 @@ def plan_score(
 def _by_arm(
     plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
 ) -> tuple[list[tuple[Poses, ...]], tuple[ArmMove, ...]]:
-    """Where robots with errors that were drawn bring the parts, and what the arm makes of the plan."""
+    """Where robots with drawn errors bring the parts, and the moves of the arm."""
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought, left_after_feeling
     from apo_bench.trial.stages import robot_error_of
@@ -171,8 +171,8 @@ def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
     return np.asarray(_spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)[draw])
 
 
-def drawn_truths(explanation: Explanation, count: int, rng: np.random.Generator) -> Array:
-    """Goals as they may truly be, (count, n, 4, 4): of an explanation, along what contacts leave free."""
+def draw_truths(explanation: Explanation, count: int, rng: np.random.Generator) -> Array:
+    """Draw poses that may be the truth, (count, n, 4, 4), along what contacts leave free."""
     goals = explanation.goals
     try:
         space = free_space(explanation.believed, goals)
@@ -203,7 +203,7 @@ def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Arr
 
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
-    """The assembly without contacts that are not believed."""
+    """The assembly without dropped contacts."""
     if not dropped:
         return assembly
     left = {
@@ -219,10 +219,10 @@ def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
 
 
 def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Sequence[Poses]]) -> float:
-    """How surely everything that a plan is measured by is within what is allowed, from 0 to 1.
+    """How surely all measures of a plan are within their limits, from 0 to 1.
 
     Args:
-        ends: Where robots bring the parts, one with each of the errors that were drawn; none: as planned.
+        ends: Where robots bring the parts, one with each of the drawn errors; none: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
@@ -246,7 +246,7 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
-    """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
+    """How surely faces overlap as the judge requires, if the plan is executed exactly and one of these is the truth."""
     scenario = where if isinstance(where, Scenario) else where.scenario
     overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.target_poses)[-1], truths)
     possible = overlaps[np.isfinite(overlaps)]

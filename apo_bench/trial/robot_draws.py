@@ -1,4 +1,4 @@
-"""Where a robot with errors of its own would bring the parts of a plan: geometry, no physics.
+"""Where a robot with errors brings the parts of a plan: geometry, no physics.
 
 The hand goes where the errors put it. Closing, its pads centre the part between them and lie flat on it, so what is
 wrong along and about them when the part is taken is taken along, and what is wrong across them is not. What is let go

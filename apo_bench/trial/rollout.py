@@ -1,4 +1,4 @@
-"""A trial to be looked at: what was demonstrated and replayed, and the goals as seen, as corrected and as they are."""
+"""A trial as something to show: demonstration and replay, and poses as observed, as corrected and true."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Rollout:
     scene: Scene
     segments: tuple[Segment, ...]
     assembled: Poses
-    """Where the parts should be when all is done."""
+    """Where the parts belong in the end."""
     goals: Mapping[str, Array] = field(default_factory=dict)
     """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
 
@@ -89,12 +89,14 @@ def ending(row: TrialRecord) -> str:
 def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Segment:
     track = FilmTrack()
     watch_again(scene, simulated, spec.human_error_scale, spec.seed, spec.secret_seed, track.hooks)
-    how = f"seen with errors of {spec.noise_mm:g} mm and {spec.noise_deg:g} deg"
+    observed = f"observed with noise of {spec.noise_mm:g} mm and {spec.noise_deg:g} deg"
+    if spec.pose_source == DEPTH_CAMERA:
+        observed = "observed by a depth camera"
     return Segment(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
         world=scene.shown,
         start=simulated.layout.start,
         moments=tuple(track.moments),
-        ending=f"demonstrated; {'seen by a range finder' if spec.pose_source == DEPTH_CAMERA else how}, then planned and replayed",
+        ending=f"demonstrated; {observed}, then planned and replayed",
         good=None,
     )

@@ -1,7 +1,4 @@
-"""The stages that every method of a trial shares: demonstrate, observe, replay, judge.
-
-Chance enters a trial here and nowhere else.
-"""
+"""Stages that every method of a trial shares: demonstrate, observe, replay, judge; all random numbers enter here."""
 
 from __future__ import annotations
 
@@ -67,19 +64,19 @@ class Attempt:
 
 
 def stream(seed: int, which: int, secret_seed: SecretSeed | None = None) -> np.random.Generator:
-    """The random numbers of one stage of one trial; nothing but seed, stage and salt is in the key."""
+    """The random numbers of one stage of one trial; the key has only seed, stage and secret seed."""
     return np.random.default_rng(stream_key(seed, which, secret_seed))
 
 
 def stream_key(seed: int, which: int, secret_seed: SecretSeed | None = None) -> tuple[int, ...]:
-    """What `numpy.random.default_rng` makes the random numbers of a stage of."""
+    """The seed of `numpy.random.default_rng` for a stage."""
     return (seed, which, *(secret_seed.words(seed, which) if secret_seed else ()))
 
 
 def simulate_demonstration(
     scene: Scene, human_error_scale: float, seed: int, pose_source: str = "noise", secret_seed: SecretSeed | None = None
 ) -> SimulatedDemonstration:
-    """Draw the truth of a trial and let the human demonstrate it; the eye `range` takes images of that."""
+    """Draw the truth of a trial and let the human demonstrate it; a depth camera takes images of that."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, secret_seed), scene.clearance_mm)
     rng = stream(seed, DEMONSTRATION, secret_seed)
     if pose_source != DEPTH_CAMERA:
@@ -122,7 +119,7 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: floa
     from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.rays import ModelRays
 
-    assert simulated.images is not None, "simulate the demonstration with eye='range'"
+    assert simulated.images is not None, "simulate the demonstration with pose_source='depth-camera'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
     camera = simulated.images

@@ -24,7 +24,6 @@ from apo_bench.records import (
     RECORD_SCHEMA,
     REQUIRED,
     SETTINGS,
-    look_up,
     setting_columns,
     settings_of,
 )
@@ -99,7 +98,7 @@ def test_a_trial_is_written_as_before() -> None:
         assert [column for column in again if column in before] == list(before)
         same = [info.name for info in SETTINGS.values() if info.name in before]
         for column in (*same, "success", "failure_stage", "failure_code", "corrected_operations"):
-            assert look_up(again, column) == before[column]
+            assert dict(again)[column] == before[column]
 
 
 def test_a_folder_that_was_kept_is_reported_and_compared(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A plan promises how likely it is to succeed, from what its planner knew; below `min_predicted_success` nothing moves."""
+"""Predicted success follows from what the planner knows; below `min_predicted_success` nothing moves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial import run
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.predicted_success import Explanation, abstain, drawn_truths, predict_success
+from apo_bench.trial.predicted_success import Explanation, abstain, draw_truths, predict_success
 from apo_bench.trial.predicted_success_table import RATES, SCORES
 from apo_bench.trial.robot_draws import brought
 from apo_bench.trial.run import noise_of
@@ -182,7 +182,7 @@ def test_truths_are_drawn_where_contacts_hold(scene: Scene, simulated: Simulated
 
     seen = observe_demonstration(simulated, noise_of(asked(noise_mm=0.1, noise_deg=0.1), scene, simulated), SEED)
     correction = correct(seen, "contact")
-    truths = drawn_truths(Explanation(1.0, seen, correction.poses), 8, np.random.default_rng(0))
+    truths = draw_truths(Explanation(1.0, seen, correction.poses), 8, np.random.default_rng(0))
     gaps = [largest_gap(seen.assembly, seen.start, goals) for goals in truths]
     moved = np.abs(truths - correction.poses).max(axis=(1, 2, 3))
     assert max(gaps) < 1e-4 < max(moved)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.records import SecretSeed, TrialRecord, look_up
+from apo_bench.records import SecretSeed, TrialRecord
 from apo_bench.records.run.validation import unwritable
 from apo_bench.trial.stages import IN_HAND, WRENCH, stream, stream_key
 
@@ -42,17 +42,17 @@ def test_a_row_says_what_was_felt_and_with_what(scene: Scene) -> None:
     assert (found["ft_sensor"], found["assumed_robot_error"]) == ("ideal", "hand_eye:1/0.2")
     assert found["probe_contacts"]
     for column in FELT[2:]:
-        assert look_up(found, column) > 0.0
+        assert dict(found)[column] > 0.0
     assert unwritable(found) == ""
 
 
 def test_a_robot_that_does_not_feel_says_nothing(scene: Scene) -> None:
     found = row(scene, method="oracle+spiral")
-    assert [look_up(found, column) for column in FELT] == [None] * len(FELT)
+    assert [found.get(column) for column in FELT] == [None] * len(FELT)
     again = row(scene, method="oracle+spiral", ft_sensor="joint-torque", assumed_robot_error="unknown")
     given = ("config_hash", "ft_sensor", "assumed_robot_error")
     same = [column for column in found if column not in given]
-    assert [look_up(again, column) for column in same] == [look_up(found, column) for column in same]
+    assert [again.get(column) for column in same] == [found.get(column) for column in same]
 
 
 def test_the_noise_of_the_sensor_has_a_stream_of_its_own() -> None:

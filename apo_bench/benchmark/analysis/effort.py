@@ -9,7 +9,7 @@ from apo_bench.records.run.trials import trials_of
 
 
 def efforts(records: Records) -> list[Line]:
-    """One line per scenario and method that had a success, of these trials, over every noise level and human error scale."""
+    """One line per scenario and method: means over its successes, at every noise level and human error scale."""
     trials = trials_of(records)
     right = trials.where(trials.number("success") == 1)
     return [

@@ -75,7 +75,7 @@ class Paired:
 def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
     """Every method but the oracle against every reference, condition by condition, sorted as `tally` sorts.
 
-    A setting that does not affect the reference is a default in its records, so one reference serves several conditions.
+    A setting that does not affect the reference has its default there, so one reference serves several conditions.
     The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
 
     Raises:

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Records, rank
+from apo_bench.benchmark.analysis import Condition, Records, condition_of, order
+from apo_bench.benchmark.analysis.condition import by_method
 from apo_bench.benchmark.analysis.rates import was_executed
 from apo_bench.records import SecretSeed, TrialRecord
 from apo_bench.records.own_code import DATA_PREFIXES, describe_own_code, is_own_code
@@ -80,20 +81,11 @@ def _names_code(trials: Trials) -> Mask:
 
 def _first(trials: Trials) -> Sequence[TrialRecord]:
     """The trials of the first seed of each method and scenario."""
-    firsts = (
-        own.where(own.number("seed") == own.number("seed")[0]) for own in trials.parts(("method", "scenario")).values()
-    )
-    return cast(list[TrialRecord], [row for own in firsts for row in own.rows()])
+    firsts = (own.where(own.number("seed") == own.number("seed")[0]) for own in by_method(trials).values())
+    return cast(list[TrialRecord], [record for own in firsts for record in own.rows()])
 
 
-def _order(shown: Mapping[str, int], row: TrialRecord) -> tuple[Any, ...]:
-    where = (
-        row["scenario"],
-        row["clearance_mm"],
-        row["noise"],
-        row["contact_source"],
-        row["human_error_scale"],
-        row["noise_mm"],
-    )
-    often = shown[row["method"]] + shown[row["scenario"]]
-    return (often, row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)
+def _order(shown: Mapping[str, int], record: TrialRecord) -> tuple[Any, ...]:
+    often = shown[record["method"]] + shown[record["scenario"]]
+    is_uncorrected = record["method"] == "uncorrected"
+    return (often, record["seed"], is_uncorrected, order(cast(Condition, condition_of(record))))

@@ -5,7 +5,6 @@ Only the process that started the sweep writes rows. A node that is lost has its
 
 import importlib.util
 import os
-import re
 import shutil
 import signal
 import socket
@@ -56,17 +55,17 @@ def check_ray(address: str | None) -> None:
     named = (os.environ.get("RAY_ADDRESS") or "auto") if address in (None, "auto") else str(address)
     if named in ("auto", "local"):
         return
-    match = re.fullmatch(r"\[?([^\[\]/]+)\]?:(\d{1,5})", named)
-    if match is None or not 0 < int(match[2]) < 2**16:
-        raise InputError(
-            f"the address '{named}' of a Ray cluster was given; HOST:PORT of its head is allowed, such as "
-            "10.0.0.5:6379, or auto, or local."
-        )
+    host, _, port = named.rpartition(":")
+    require(
+        host and "/" not in host and port.isdecimal() and 0 < int(port) < 2**16,
+        f"the address '{named}' of a Ray cluster was given; HOST:PORT of its head is allowed, such as 10.0.0.5:6379, "
+        "or auto, or local.",
+    )
     try:
-        socket.create_connection((match[1], int(match[2])), timeout=_TOUCH_S).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_TOUCH_S).close()
     except (OSError, UnicodeError) as error:
         raise InputError(
-            f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={match[2]}"
+            f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={port}"
         ) from error
 
 

@@ -27,27 +27,17 @@ Mask = NDArray[np.bool_]
 Index = NDArray[np.integer[Any]]
 """(n,) numbers of trials, or of what they have."""
 _NOT_KEPT = (
-    *(
-        "env_id",
-        "thresholds",
-        "as_demonstrated_code",
-        "conditions",
-        "tried_corrections",
-        "fit_adjustments",
-        "grasp_slip",
-        "reached",
-    ),
-    "failure_prediction",  # has columns of its own
+    *("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried_corrections", "fit_adjustments"),
+    *("grasp_slip", "reached", "failure_prediction"),  # the last has its own columns
 )
 _USUAL = {info.name: info.default for name, info in SETTINGS.items() if name != "scenario"}
-_PLAIN = {msgspec.inspect.FloatType: float, msgspec.inspect.IntType: int, msgspec.inspect.BoolType: bool}
 
 
 def _kind(annotation: Any) -> type | None:
     """Float, int or bool; None of anything else."""
     info = msgspec.inspect.type_info(annotation)
-    kinds = {type(part) for part in getattr(info, "types", (info,))}
-    return next((plain for found, plain in _PLAIN.items() if found in kinds), None)
+    kinds = {type(part).__name__ for part in getattr(info, "types", (info,))}
+    return next((kind for kind in (float, int, bool) if f"{kind.__name__.title()}Type" in kinds), None)
 
 
 COLUMNS: Mapping[str, type | None] = {
@@ -83,7 +73,7 @@ class Trials:
     """Trial records as columns.
 
     Attributes:
-        numbers: Column -> (n,); NaN where a record does not say, 1 for true.
+        numbers: Column -> (n,); NaN where a record lacks it, 1 for true.
         coded: All other columns.
     """
 
@@ -94,7 +84,7 @@ class Trials:
         return len(self.numbers["seed"])
 
     def find_secret_seed(self) -> str | None:
-        """The hash of the salt that all trials were drawn with.
+        """The hash of the secret seed that all trials were drawn with.
 
         Raises:
             InputError: They were drawn with several, so that their seeds are different trials.
@@ -106,7 +96,7 @@ class Trials:
         return self.numbers[name]
 
     def values(self, name: str) -> list[Any]:
-        """A column as plain values; None where a record does not say."""
+        """A column as plain values; None where a record lacks it."""
         if name in self.coded:
             codes, names = self.coded[name]
             return [names[code] for code in codes.tolist()]
@@ -156,18 +146,15 @@ class Trials:
 
 
 def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
-    """The columns of records; settings that a record does not say are as usual."""
+    """The columns of records; settings that a record lacks are defaults."""
     if isinstance(records, Trials):
         return records
     numbers: dict[str, array[float]] = {name: array("d") for name, kind in COLUMNS.items() if kind is not None}
     codes: dict[str, array[int]] = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
     names: dict[str, dict[Any, int]] = {name: {} for name in codes}
     for record in records:
-        said = (
-            _USUAL
-            | dict(record)
-            | {f"predicted_{key}": x for key, x in (record.get("failure_prediction") or {}).items()}
-        )
+        prediction = record.get("failure_prediction") or {}
+        said = _USUAL | dict(record) | {f"predicted_{key}": x for key, x in prediction.items()}
         for name, numbered in numbers.items():
             number = said.get(name)
             numbered.append(math.nan if number is None else number)
