@@ -14,7 +14,7 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.records import TrialConfig, TrialRecord
-from benchmarks.provenance import mujoco_of, count_revisions, with_mujoco
+from benchmarks.provenance import count_revisions, mujoco_of, with_mujoco
 from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
