@@ -155,7 +155,7 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
         with pytest.raises(apo_bench.InputError, match="observed of Observation must be an array of True"):
             dataclasses.replace(observation, observed=seen)
     start = {**observation.start, "stik": np.eye(4)}
-    shown = {"human_covariance": observation.covariance, "final": {}}
+    shown = {"human_error_covariance": observation.covariance, "final": {}}
     parts = {"assembly": observation.assembly, "poses": observation.poses}
     plan = {"assembly": observation.assembly, "target_poses": observation.poses}
     for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, plan)):
