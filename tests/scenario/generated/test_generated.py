@@ -13,7 +13,7 @@ from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import Demonstration, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
-from apo_bench.importers.assembly.touching import found_contacts
+from apo_bench.importers.assembly.touching import find_contacts
 from apo_bench.perception.observation.observing import observe
 from apo_bench.scenario import draw_layout, is_named, nominal_operations, scenario_path
 from apo_bench.scenario.generated import FAMILIES, generate_assembly, whole_name, write_generated
@@ -90,7 +90,7 @@ def test_its_contacts_are_those_that_touch(scenario: Scenario) -> None:
     assembly = scenario.assembly
     end = placements(assembly, scenario.start, scenario.goals)[-1]
     said = {frozenset(each.contact) for each in assembly.relations() if each.lost is None}
-    touching = {frozenset(contact) for contact in found_contacts(assembly.solids, end)}
+    touching = {frozenset(contact) for contact in find_contacts(assembly.solids, end)}
     assert said == {pair for pair in touching if not {each.part for each in pair} <= assembly.fixed}
 
 
