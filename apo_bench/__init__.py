@@ -33,6 +33,7 @@ _EXPORTS = MappingProxyType(
         "Correction": "apo_bench.assembly.correction_record",
         "Criteria": "apo_bench.records.thresholds",
         "Demonstration": "apo_bench.assembly.demonstration",
+        "ExecutionConfig": "apo_bench.simulation.execution.config",
         "Film": "apo_bench.simulation.scene.render",
         "Flatten": "apo_bench.envs.flatten",
         "InputError": "apo_bench.errors",

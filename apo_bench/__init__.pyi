@@ -34,6 +34,7 @@ from apo_bench.scenario.saving import save_scenario as save_scenario
 from apo_bench.scenario.scenario import Scenario as Scenario
 from apo_bench.simulation.arms.arm import Arm as Arm
 from apo_bench.simulation.arms.building import read_arm as read_arm
+from apo_bench.simulation.execution.config import ExecutionConfig as ExecutionConfig
 from apo_bench.simulation.execution.controller import replay as replay
 from apo_bench.simulation.human.demonstration import demonstrate as demonstrate
 from apo_bench.simulation.scene.render import Film as Film

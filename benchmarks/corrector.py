@@ -64,11 +64,11 @@ def find_optimum(observation: Observation, begin: Array) -> Array:
         return xi, observation.poses @ pose.exp(xi)
 
     def gaps(z: Array) -> Array:
-        return 1e3 * system.linearised(displace(z)[1])[0]
+        return 1e3 * system.linearise(displace(z)[1])[0]
 
     def slopes(z: Array) -> Array:
         xi, poses = displace(z)
-        J = system.linearised(poses)[1].reshape(-1, n, 6)
+        J = system.linearise(poses)[1].reshape(-1, n, 6)
         return 1e3 * np.einsum("mki,kij->mkj", J, right_jacobian(xi) @ L).reshape(-1, 6 * n)
 
     # SLSQP needs independent constraints: keep the directions that the contacts fix at the start.

@@ -17,9 +17,9 @@ def mujoco_of(folders: Iterable[Path]) -> list[str]:
     return sorted({run["versions"]["mujoco"] for run in _runs(folders)})
 
 
-def states_of_code(folders: Iterable[Path]) -> int:
-    """Count the states of the package that these sweeps ran with."""
-    return len({json.dumps(run["code"], sort_keys=True) for run in _runs(folders)})
+def count_revisions(folders: Iterable[Path]) -> int:
+    """Count the git revisions of the package that these sweeps ran with."""
+    return len({run["revision"] for run in _runs(folders)})
 
 
 def versions_of(page: str) -> list[str]:

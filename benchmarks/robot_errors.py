@@ -14,7 +14,7 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.records import TrialConfig, TrialRecord
-from benchmarks.provenance import mujoco_of, states_of_code, with_mujoco
+from benchmarks.provenance import count_revisions, mujoco_of, with_mujoco
 from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
@@ -28,8 +28,8 @@ Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_
 Success: the finished assembly is right; the same seeds in every condition, no human error, clearance of 0.25 mm per
 side, and noise of 1 mm and 1 degree for all methods but `oracle`. Every trial draws a [robot
 error](../guide/arm.md#errors-of-the-robot); the numbers are standard deviations in mm and degrees.
-Rates over all scenarios have Wilson's 95 % intervals. The sweeps ran with {} state(s) of the package, so lines may be
-some commits apart.
+Rates over all scenarios have Wilson's 95 % intervals. The sweeps ran with {} revision(s) of the package, so lines
+may be some commits apart.
 """
 SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
 USUAL = {"arm": "six_axis", "ft_sensor": TrialConfig.ft_sensor, "assumed_robot_error": TrialConfig.assumed_robot_error}
@@ -39,12 +39,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path)
     folders = parser.parse_args().folders
-    written = page(read_judged(folders), states_of_code(folders))
+    written = page(read_judged(folders), count_revisions(folders))
     PAGE.write_text(with_mujoco(written, mujoco_of(folders)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
-def page(every: Sequence[TrialRecord], states: int) -> str:
+def page(every: Sequence[TrialRecord], revisions: int) -> str:
     rows = [row for row in every if _is_usual(row)]
     methods = sorted({row["method"] for row in rows})
     errors = sorted({str(row["robot_error"]) for row in rows}, key=_by_size)
@@ -53,7 +53,7 @@ def page(every: Sequence[TrialRecord], states: int) -> str:
     times = group(rows, lambda row: (row["method"], row["scenario"]))
     heads = [f"`{method}`" for method in methods]
     lines = [
-        HEAD.format(states),
+        HEAD.format(revisions),
         "## Over all scenarios\n",
         *table(
             ("robot error", *heads),

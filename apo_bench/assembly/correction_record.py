@@ -96,9 +96,9 @@ class Hypothesis:
     assumed: Observation
     """What the poses are the correction of."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was observed is assumed, counted from 0."""
+    """Operations whose observations are all rejected, counted from 0."""
     dropped: tuple[str, ...] = ()
-    """Relations that are not assumed."""
+    """Relations that are rejected."""
     sentence: str = ""
     """What is assumed in place of what was stated, in words; empty if all is assumed as stated."""
     noise_scale: float = 1.0
@@ -145,7 +145,7 @@ class Correction:
     dropped: tuple[str, ...] = ()
     """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was observed is assumed, counted from 0: their poses are inferred."""
+    """Operations whose observations are all rejected, counted from 0: their poses are inferred."""
     assumed: Observation | None = None
     """What was corrected in place of the observation, which the posterior is of: without outliers, with further looks;
     None if it was the observation."""

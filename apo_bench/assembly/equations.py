@@ -83,7 +83,7 @@ class Equations:
         """e of every equation, (m,), [m]: positive where faces are apart, negative where they are inside each other."""
         return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(poses))[0])
 
-    def linearised(self, poses: Array) -> tuple[Array, Array]:
+    def linearise(self, poses: Array) -> tuple[Array, Array]:
         """e, (m,), and its derivative by the body twists of all poses, (m, 6 n), [m] per [m, rad]: df/dq of Eq. 10.
 
         A letter T in n .. T .. v turns n (everything up to T) = (a, .) and (everything behind T) v = p, so its rows

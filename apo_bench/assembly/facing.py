@@ -53,8 +53,8 @@ def facing(
     """
     if balls_apart(a.pieces, T_a, b.pieces, T_b) > gap_m:
         return
-    posed_a = _posed(a, T_a)
-    posed_b = _posed(b, T_b)
+    posed_a = _pose_faces(a, T_a)
+    posed_b = _pose_faces(b, T_b)
     for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
         if (posed_a.faces[i].name, posed_b.faces[j].name) in known:
             continue
@@ -90,7 +90,7 @@ class _Posed(NamedTuple):
     """The corners of each outline, (k, 3), [m]."""
 
 
-def _posed(solid: Solid, T: Array) -> _Posed:
+def _pose_faces(solid: Solid, T: Array) -> _Posed:
     faces = tuple(solid.faces.values())
     normals = np.array([face.normal for face in faces]).reshape(-1, 3)
     return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])

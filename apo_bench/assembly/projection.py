@@ -41,7 +41,7 @@ def project_round_faces(assembly: Assembly) -> Assembly:
     Raises:
         InputError: A contact of round faces asks for a gap that it cannot have.
     """
-    return _lowered(assembly) or assembly
+    return _project(assembly) or assembly
 
 
 def project_observation(observation: Observation) -> Observation:
@@ -57,7 +57,7 @@ def project_observations(observations: Sequence[Observation]) -> Sequence[Observ
 
 
 @remembered
-def _lowered(assembly: Assembly) -> Assembly | None:
+def _project(assembly: Assembly) -> Assembly | None:
     """None of an assembly without round contacts: what is remembered of an object must not keep it alive."""
     if not any(assembly.is_round(contact) for operation in assembly.operations for contact in operation.contacts):
         return None
@@ -90,14 +90,14 @@ class _Sheets:
             lower = [self._on_plane(contact)]
         elif kind == "cone on rim":
             cone_of, rim_of = _first(contact, self._assembly.round_face(contact.manipulated).kind == "cone")
-            lower = [*self._coaxial(cone_of, rim_of, 2), self._seated(cone_of, rim_of)]
+            lower = [*self._coaxial(cone_of, rim_of, 2), self._seat(cone_of, rim_of)]
         else:
             lengths = [self._assembly.round_face(of).length for of in contact]
             long, short = _first(contact, lengths[0] >= lengths[1] - _SAME_M)
             lower = self._coaxial(long, short, WALLS if gap.kind == "clearance" else 2)
-            lower += [self._seated(long, short)] if kind == "cone in cone" else []
+            lower += [self._seat(long, short)] if kind == "cone in cone" else []
         swapped = lower[0].manipulated.part != contact.manipulated.part
-        lower = [self._marked(low) if swapped else low for low in lower]
+        lower = [self._mark(low) if swapped else low for low in lower]
         self.origin.update(dict.fromkeys(lower, contact))
         return lower
 
@@ -121,7 +121,7 @@ class _Sheets:
             contacts.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
         return contacts
 
-    def _seated(self, cone_of: PartFace, other_of: PartFace) -> Contact:
+    def _seat(self, cone_of: PartFace, other_of: PartFace) -> Contact:
         """The middle of a face in the plane across a cone where both are as wide."""
         cone = self._assembly.round_face(cone_of)
         other = self._assembly.round_face(other_of)
@@ -142,7 +142,7 @@ class _Sheets:
         self.sheets[named] = Face(named.face, points, fit=fit, stated_normal=normal, opposes=opposes)
         return named
 
-    def _marked(self, low: Contact) -> Contact:
+    def _mark(self, low: Contact) -> Contact:
         """A contact whose plane belongs to the environment of the given one, under a name that says so."""
         named = low.manipulated._replace(face=f"{low.manipulated.face}, turned round")
         self.sheets[named] = replace(self.sheets[low.manipulated], name=named.face)

@@ -48,7 +48,7 @@ def touched_contacts(
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]
         if len(rests) == 1:
-            touches += list(_touched(assembly, contact, rests[0], poses))
+            touches += list(_touch_normals(assembly, contact, rests[0], poses))
     return touches
 
 
@@ -81,7 +81,7 @@ def mouth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, wa
     return float(ahead.max() - before.min())
 
 
-def _touched(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses) -> Iterator[TouchedContact]:
+def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses) -> Iterator[TouchedContact]:
     m, e = contact
     other = m if rests == e else e
     still = assembly.face_of(rests)

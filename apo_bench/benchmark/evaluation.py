@@ -40,7 +40,8 @@ def evaluate(
         save: Folder of the records, as `apo-bench sweep` writes it; the same call continues an interrupted run.
             Default: a temporary folder.
         settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ...; the
-            defaults are those of one trial, and `seed` is the first seed. A scenario may be a `Scenario`, and `noise` a function.
+            defaults are those of one trial, and `seed` is the first seed. A scenario may be a `Scenario`, and `noise` a
+            function.
 
     Returns:
         A table with the success rate of each condition.

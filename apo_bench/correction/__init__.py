@@ -8,14 +8,14 @@ What one correction by `contact` calls, in the folder `contact` unless another i
 
     correctors.correct                      the public call: checks, and projects round faces to planes
       contact.ContactCorrector.together     many at once; alone what is large, or states tails or shared errors
-        contact._corrected
+        contact._correct
           problem.problem_of                contacts become equations (solvers.projected_contacts), noise becomes L
           solved.solve                      the nearest poses with rank, covariance and test
             solvers.gauss_newton._nearest   the loop; each iteration linearises the equations, then takes the shortest z
                                             on them (solvers.linear_step, solvers.sparse, or solvers.kernels compiled)
             squared_length.chi_squares      the squared length of the correction
-            solved._solved                  gaps, rank and covariance (solvers.posterior)
-            solved._solved_in_full          instead, where contacts contradict each other, or with inequalities, play or
+            solved._describe                gaps, rank and covariance (solvers.posterior)
+            solved._describe_in_full        instead, where contacts contradict each other, or with inequalities, play or
                                             tails; squared_length.relaxed_chi_square runs the loop again
           contact._report                   the Correction, if it is in no doubt; otherwise
           contact._in_doubt                 not converged, the test fails, a pose turned far, faces look the same way

@@ -72,10 +72,10 @@ def directions(space: Array) -> tuple[Direction, ...]:
     F = _span(space * weights[:, None])
     _, w, Vt = np.linalg.svd(F[3:], full_matrices=True)
     turning = int(np.count_nonzero(w > _ZERO))
-    shifts = _aligned(_span(F[:3] @ Vt[turning:].T))
+    shifts = _align(_span(F[:3] @ Vt[turning:].T))
     turns = F @ Vt[:turning].T
     axes = [Direction(np.concatenate([axis, np.zeros(3)])) for axis in shifts]
-    for axis in _aligned(_span(turns[3:])):
+    for axis in _align(_span(turns[3:])):
         turn = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * _LENGTH_M
         v = turn[:3] - sum((b @ turn[:3]) * b for b in shifts)
         axes.append(Direction(np.concatenate([np.where(np.abs(v) < _ZERO * _LENGTH_M, 0.0, v), axis])))
@@ -94,7 +94,7 @@ def _span(columns: Array) -> Array:
     return U[:, : np.count_nonzero(w > _ZERO * w.max(initial=0.0))]
 
 
-def _aligned(basis: Array) -> list[Array]:
+def _align(basis: Array) -> list[Array]:
     """An orthonormal basis, (3,) each, of a space of vectors (3, d), the nearest axis first each time."""
     P = basis @ basis.T
     vectors = list[Array]()

@@ -32,7 +32,7 @@ from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
-from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearised_by, twists_of
+from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearise_by, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
 
@@ -115,7 +115,7 @@ class Explanation:
     shared: tuple[SharedEstimate, ...] = ()
     """What is known of the errors that operations share."""
     left_out: tuple[int, ...] = ()
-    """Operations of which nothing that was observed is assumed, counted from 0."""
+    """Operations whose observations are all rejected, counted from 0."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """What else may be assumed of what was observed, each with its weight, as of the correction."""
 
@@ -153,7 +153,7 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
     xi = pose.log(pose.inverse(observation.poses) @ poses)
     Jr = right_jacobian(xi)
     B = Jr @ problem.L[0]
-    _, Jt = linearised_by(system, poses, B)
+    _, Jt = linearise_by(system, poses, B)
     every = relation_holds(assembly)
     relations = by_relation(assembly, system, Jt, kept)
     known = freedom_of(relations.Jt)
@@ -164,7 +164,7 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
     if observation.shared:
         shared, spans = estimate_shared(observation, xi, Jr, system.among(kept))
     explained = []
-    for k, own in enumerate(_own(known, n)):
+    for k, own in enumerate(_own_directions(known, n)):
         block = slice(6 * k, 6 * k + 6)
         C = spans[k] @ spans[k].T
         named = directions(B[k] @ own[block])
@@ -214,7 +214,7 @@ def _too_many(n: int) -> InputError:
     )
 
 
-def _own(known: Freedom, n: int) -> Iterator[Array]:
+def _own_directions(known: Freedom, n: int) -> Iterator[Array]:
     """The free directions of each operation, (6 n, f_k), orthonormal in its own block, with what must go along.
 
     One operation after the other is held fast; what goes along is the least, in standard deviations.

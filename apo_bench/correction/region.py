@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Correction, Observation, project_observation
 from apo_bench.correction.contact.drawn import drawn_radius
 from apo_bench.correction.contact.problem import seen_system
-from apo_bench.correction.solvers import coordinates_of, freedom_of, linearised_by, noise_factor
+from apo_bench.correction.solvers import coordinates_of, freedom_of, linearise_by, noise_factor
 from apo_bench.geometry import Array, pose, right_jacobian
 
 
@@ -48,7 +48,7 @@ def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], trut
     L = noise_factor(observation)
     xi = pose.log(pose.inverse(observation.poses) @ poses)
     system = seen_system(observation).among(_equal(observation, dropped))
-    known = freedom_of(linearised_by(system, poses, right_jacobian(xi) @ L)[1])
+    known = freedom_of(linearise_by(system, poses, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free

@@ -9,7 +9,7 @@ from apo_bench.assembly import Observation, SharedError, joint_covariance
 from apo_bench.correction.solvers import (
     CompactEquations,
     freedom_of,
-    linearised_by,
+    linearise_by,
     noise_factor,
     twists_of,
 )
@@ -56,7 +56,7 @@ def estimate_shared(
     """
     L = noise_factor(observation)
     seen = observation.poses
-    known = freedom_of(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
+    known = freedom_of(linearise_by(system, seen @ pose.exp(xi), Jr @ L)[1])
     if known is None:
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
     joint = joint_covariance(seen, observation.covariance, observation.shared)

@@ -43,15 +43,15 @@ def across_sides(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
 
 def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """Those across an edge of each, (k, 3)."""
-    return _crossed(a.edges @ R_a.T, b.edges @ R_b.T)
+    return _cross(a.edges @ R_a.T, b.edges @ R_b.T)
 
 
 def box_axes(R_a: Array, R_b: Array) -> Array:
     """The directions along which two boxes may be apart, (k, 3), by their orientations, (3, 3)."""
-    return np.concatenate([R_a.T, R_b.T, _crossed(R_a.T, R_b.T)])
+    return np.concatenate([R_a.T, R_b.T, _cross(R_a.T, R_b.T)])
 
 
-def _crossed(edges_a: Array, edges_b: Array) -> Array:
+def _cross(edges_a: Array, edges_b: Array) -> Array:
     """The cross product of each of some directions, (a, 3), with each of others, (b, 3), unit length; parallel ones
     give none."""
     u = edges_a[:, None]

@@ -84,7 +84,7 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     if high > low and abs(at[1] - at[0]) > _EDGE_ON * a.length:
         # The ends of the common length, taken back to the axis of the first face.
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
-        common = _unrolled([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
+        common = _unroll([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
     rise, sine = _rise(b, T_b, a, T_a) if b.kind == "cone" else (0.0, 0.0)
     angle = angle_between(u, v) if b.kind == "cone" else _between(u, v)
     length = max(0.0, float(high - low))
@@ -103,7 +103,7 @@ def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     rise, sine = _rise(cone, T_cone, rim, T_rim)
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
     over = fits and float(np.linalg.norm(off)) < rim.radius
-    common = _unrolled([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NO_OVERLAP
+    common = _unroll([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NO_OVERLAP
     return Mate(points, off, v, angle_between(u, v), rise, sine, common, 0.0)
 
 
@@ -126,7 +126,7 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
         common = _shadow(lines, flat_ends, shaft.radius, points)
     elif lines:
         spans = shaft.span[0] + shaft.length * np.array(lines)
-        common = _unrolled([(low, high) for low, high in spans], 2.0 * shaft.radius, points)
+        common = _unroll([(low, high) for low, high in spans], 2.0 * shaft.radius, points)
     angle = _between(axis, n)
     length = shaft.length * sum(high - low for low, high in lines)
     return Mate(points, np.outer(heights, n), axis, np.pi / 2 - angle, 0.0, 0.0, common, length)
@@ -191,7 +191,7 @@ def _shadow(lines: list[tuple[float, float]], ends: Array, radius: float, points
     return Overlap(points, float(shape.area), shape)
 
 
-def _unrolled(spans: list[tuple[float, float]], width: float, points: Array) -> Overlap:
+def _unroll(spans: list[tuple[float, float]], width: float, points: Array) -> Overlap:
     """A wall between heights along its axis, (low, high), unrolled to a plane."""
     from shapely import box, union_all
 

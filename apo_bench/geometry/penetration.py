@@ -122,12 +122,12 @@ def _piece_by_piece(
     """
     pairs = _pairs(a, R_a, at, b, T_b, apart_m)
     if len(at) < 2 or len(at) * len(pairs) < _MOST_ROOMS:
-        return _measured(a, R_a, at, b, T_b, pairs, apart_m)
+        return _measure(a, R_a, at, b, T_b, pairs, apart_m)
     halves = (at[: len(at) // 2], at[len(at) // 2 :])
     return np.concatenate([_piece_by_piece(a, R_a, each, b, T_b, apart_m) for each in halves])
 
 
-def _measured(
+def _measure(
     a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any, apart_m: float
 ) -> Array:
     """The depth of the deepest of some pairs, (p, 2), at k places, (k,)."""
@@ -275,7 +275,7 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
         if pairs is None:
             depths = intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
         else:
-            depths = _measured(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0)
+            depths = _measure(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0)
         met = np.flatnonzero(depths > TOUCH_M)
         if len(met):
             return begin + int(met[0])

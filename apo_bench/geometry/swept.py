@@ -39,7 +39,7 @@ class Posed(NamedTuple):
     """(4, 4), world, [m]."""
 
 
-def _boxed(
+def _box_spans(
     moving: Posed, way: Array, resting: Posed, slack_m: float, within: tuple[float, float] = _ANYWHERE
 ) -> tuple[NDArray[np.intp], Array]:
     """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
@@ -105,7 +105,7 @@ def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: S
     """Whether parts can be moved so far as one without coming into any other."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
-            pairs, spans = _boxed(m, way, r, _SLACK_M, (0.0, length_m))
+            pairs, spans = _box_spans(m, way, r, _SLACK_M, (0.0, length_m))
             if not (all_boxes(m.pieces) and all_boxes(r.pieces)):
                 # One pair that meets is enough: those first whose boxes do so along most of the way.
                 meet = np.minimum(spans[:, 1], length_m) - np.maximum(spans[:, 0], 0.0)
@@ -132,7 +132,7 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
     exact = list[bool]()
     owners = list[tuple[Posed, Posed, int]]()
     for m, r in product(moving, resting):
-        pairs, intervals = _boxed(m, way, r, -_SLACK_M)
+        pairs, intervals = _box_spans(m, way, r, -_SLACK_M)
         spans += list(intervals)
         exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(intervals)
         owners += [(m, r, int(k)) for k in pairs]

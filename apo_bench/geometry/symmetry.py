@@ -188,7 +188,7 @@ def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:
     """Whether two unions of boxes, each a centre and half sizes, fill the same space: cell by cell of their grid."""
     cuts = [_cuts(np.array([at[i] + s * half[i] for at, half in a + b for s in (-1.0, 1.0)])) for i in range(3)]
     middles = [(cut[1:] + cut[:-1]) / 2 for cut in cuts]
-    return bool(np.array_equal(_filled(a, middles), _filled(b, middles)))
+    return bool(np.array_equal(_fill(a, middles), _fill(b, middles)))
 
 
 def _keeps_fit(solid: Solid, g: Array) -> bool:
@@ -209,7 +209,7 @@ def _cuts(values: Array) -> Array:
     return ordered[np.append(True, np.diff(ordered) > _SAME_M)]
 
 
-def _filled(boxes: list[tuple[Array, Array]], middles: list[Array]) -> NDArray[np.bool_]:
+def _fill(boxes: list[tuple[Array, Array]], middles: list[Array]) -> NDArray[np.bool_]:
     """Which cells, given by their middles along each axis, are in one of the boxes."""
     filled = np.zeros([len(m) for m in middles], dtype=np.bool_)
     for at, half in boxes:

@@ -55,7 +55,7 @@ class MovedInHand(TypedDict):
 
 
 class Predicted(TypedDict):
-    """What a plan said about itself, and how far off it is then [mm]."""
+    """The prediction of failure, and how far off the plan is then [mm]."""
 
     fails: bool
     operation: _Operation | None
@@ -133,7 +133,7 @@ class TrialRecord(_Columns, total=False):
     penetration_mm: _Number | None
     """Largest depth of one part in another [mm]."""
     displaced_mm: _Number | None
-    """Largest distance by which a part that was in place was moved in the room, whether or not it counts [mm]."""
+    """Largest distance by which a part that was in place was moved, whether or not it counts [mm]."""
     corrected_operations: list[_Operation] | None
     """Operations whose motion parameters were corrected."""
     tried_corrections: list[FreedSet] | None
@@ -143,29 +143,29 @@ class TrialRecord(_Columns, total=False):
     fit_adjustments: list[FreeMoved] | None
     """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
     failure_prediction: Predicted | None
-    """What the plan said about itself before it was carried out."""
+    """The prediction of failure, before the plan is executed."""
     predicted_success: _Share | None
-    """Probability of success that the plan stated before it was carried out; null where there was no plan."""
+    """Predicted success probability, before the plan is executed; null without a plan."""
     gap_before_mm: _Number | None
-    """Gap of the contacts at the poses seen [mm]."""
+    """Gap of the contacts at the observed poses [mm]."""
     gap_after_mm: _Number | None
     """Gap of the contacts at the corrected poses [mm]."""
     chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
-    """Statistic of the test whether contacts and poses seen are consistent."""
+    """Statistic of the test whether contacts and observed poses are consistent."""
     chi_square_dof: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
     test_passes: bool | None
-    """Whether contacts and poses seen are consistent by that test."""
+    """Whether contacts and observed poses are consistent by that test."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
     dropped: list[Name] | None
     """Contacts that the corrector left out."""
     inferred_operations: list[_Operation] | None
-    """Operations of which nothing that was seen was believed, or nothing was seen, and that were inferred."""
+    """Operations that were inferred, since nothing was observed of them or the corrector rejects it."""
     reobservations: _Count | None
-    """How often operations were looked at again, all together; null where no corrector was asked."""
+    """How many operations were observed again, all together; null without a corrector."""
     wrong_contact: Name | None
     """The contact that is wrong, where wrong ones were given."""
     inside_95: bool | None
@@ -175,11 +175,11 @@ class TrialRecord(_Columns, total=False):
     planned_error_free_mm: _Size | None
     """Root mean square distance of the plan from the truth, along directions that contacts leave free [mm]."""
     contacts_true_positive: _Count | None
-    """Contacts that the corrector was told and that are right."""
+    """Given contacts that are right."""
     contacts_false_negative: _Count | None
-    """Contacts that are there and that the corrector was not told."""
+    """True contacts that were not given."""
     contacts_false_positive: _Count | None
-    """Contacts that the corrector was told and that are not there."""
+    """Given contacts that are wrong."""
     joint_control: str | None
     """What moved the joints of the arm, its own actuators or servos made for it, and how much stronger the drive of its
     gripper was made; null where nothing was carried out."""
@@ -194,16 +194,15 @@ class TrialRecord(_Columns, total=False):
     grasp_slip: list[MovedInHand] | None
     """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
     probe_contacts: _Count | None
-    """Touches that told the robot something about itself. This and what follows is null of a robot that does not feel.
-    """
+    """Probe contacts that the robot used. This and what follows is null for a robot that does not probe."""
     probe_contacts_rejected: _Count | None
-    """Touches that contradicted the others and what was stated, so that they were not believed."""
+    """Probe contacts that contradicted the others, so that the robot rejected them."""
     base_error_estimate_mm: _Size | None
-    """How far the robot's base was believed to be off in the end, at the middle of the goals [mm]."""
+    """The final estimate of the error of the robot's base, at the middle of the poses [mm]."""
     base_error_estimate_deg: _Size | None
     """The same as an angle [deg]."""
     base_error_std_mm: _Size | None
-    """How far that may be wrong, as the robot says itself: root mean square, as a vector [mm]."""
+    """The stated standard deviation of that: root mean square, as a vector [mm]."""
     base_error_std_deg: _Size | None
     """The same of the angle [deg]."""
     sim_time_s: _Size | None
@@ -236,19 +235,19 @@ REQUIRED = (
 
 
 def finite(x: float | None) -> float | None:
-    """A number that a row can hold, else null."""
+    """A number that a record can hold, else null."""
     return float(x) if x is not None and abs(x) <= LARGEST_NUMBER else None
 
 
 Key = tuple[Any, ...]
-"""The columns `KEY` of a row."""
+"""The columns `KEY` of a record."""
 KEY = tuple(info.name for info in SETTINGS.values() if info.key)
 _KEY_VALUES = itemgetter(*KEY)
 
 
-def record_key(row: Mapping[str, Any]) -> Key:
-    """The key of the trial that a row is of."""
-    key: Key = _KEY_VALUES(row)
+def record_key(record: Mapping[str, Any]) -> Key:
+    """The key of the trial that a record is of."""
+    key: Key = _KEY_VALUES(record)
     return key
 
 
@@ -262,7 +261,7 @@ def trial_key(trial: TrialConfig, scenario: str) -> Key:
 
 
 def setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
-    """The settings as they stand in a row.
+    """The settings as they stand in a record.
 
     Args:
         scenario: The name of the scenario.
@@ -274,13 +273,13 @@ def setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
     }
 
 
-def settings_of(row: Mapping[str, Any], scenario: str) -> TrialConfig:
-    """The settings of the trial that a row is of, without its salt, which no row tells.
+def settings_of(record: Mapping[str, Any], scenario: str) -> TrialConfig:
+    """The settings of the trial that a record is of, without its salt, which no record tells.
 
     Args:
         scenario: A name, or the path of a scenario file.
     """
-    values = {name: row.get(info.name, info.default) for name, info in SETTINGS.items()}
+    values = {name: record.get(info.name, info.default) for name, info in SETTINGS.items()}
     return TrialConfig(**(values | {"scenario": scenario, "secret_seed": None}))
 
 

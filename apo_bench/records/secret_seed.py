@@ -70,8 +70,8 @@ def secret_seed_of_sweep(path: str | Path, folder: str | Path) -> SecretSeed:
     trials = Path(folder) / "trials.jsonl"
     require(
         not trials.exists() or trials.stat().st_size <= 0,
-        f"the secret seed file '{path}' is not there, and '{folder}' holds trials already; give the file that they were "
-        "drawn with, or choose another folder.",
+        f"the secret seed file '{path}' is not there, and '{folder}' holds trials already; give the file that they "
+        "were drawn with, or choose another folder.",
     )
     make_secret_seed(Path(path))
     return read_secret_seed(path)
@@ -94,13 +94,13 @@ def _open_privately(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
-def common_secret_seed(rows: Iterable[Mapping[str, Any]]) -> str | None:
-    """The hash of the secret seed that all rows were drawn with; None for none.
+def common_secret_seed(records: Iterable[Mapping[str, Any]]) -> str | None:
+    """The hash of the secret seed that all records were drawn with; None for none.
 
     Raises:
         InputError: They were drawn with several.
     """
-    hashes = sorted({row.get("secret_seed") or "" for row in rows})
+    hashes = sorted({record.get("secret_seed") or "" for record in records})
     require(
         len(hashes) <= 1,
         f"the records were drawn {' and '.join(map(describe_secret_seed, hashes))}; count trials of one secret seed at "
@@ -115,7 +115,7 @@ def check_same_secret_seed(holder: str, at_hand: str | None, drawn: str | None) 
     Args:
         holder: What holds the trials, in words.
         at_hand: The hash of the secret seed at hand; None if there is none.
-        drawn: The hash in their rows.
+        drawn: The hash in their records.
     """
     if at_hand == drawn:
         return

@@ -13,7 +13,7 @@ MEANINGS: tuple[Meaning, ...] = ("assembled", "as_demonstrated")
 @final
 @dataclass(frozen=True)
 class Thresholds:
-    """Lengths in mm, angles in degrees, as in files and rows."""
+    """Lengths in mm, angles in degrees, as in files and records."""
 
     fit_margin_mm: float = 0.1
     """Strict: a fit contact may be off by the clearance plus this."""

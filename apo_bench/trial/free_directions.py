@@ -20,7 +20,7 @@ from apo_bench.correction.solvers import (
     CompactEquations,
     Inequalities,
     compact_equations,
-    demanded,
+    demands_of,
     freedom_of,
     nearest_poses,
     noise_factor,
@@ -207,7 +207,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
     assembly = observation.assembly
     plain = contact_equations(assembly, observation.start, goals)
-    system, exact, inequalities = demanded(plain, assembly, observation.play_m)
+    system, exact, inequalities = demands_of(plain, assembly, observation.play_m)
     off = violations(system, exact, inequalities, goals)
     if (off > observation.gap_m).any():
         none = np.zeros(0)

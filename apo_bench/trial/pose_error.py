@@ -44,7 +44,7 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
     goals = _turned_back(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
-    _, J = contact_equations(assembly, start, truth_goals).linearised(truth_goals)
+    _, J = contact_equations(assembly, start, truth_goals).linearise(truth_goals)
     # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
     basis = _row_space(J / unit)
     fixed = basis.T @ (basis @ error)

@@ -44,7 +44,7 @@ def trial_story(
     scene: Scene,
     seen: Observation,
     track: FilmTrack,
-    row: TrialRecord,
+    record: TrialRecord,
     simulated: SimulatedDemonstration | None = None,
 ) -> Rollout:
     """What is to be seen of a trial that was replayed.
@@ -55,7 +55,7 @@ def trial_story(
     """
     plan = track.plan
     assert plan is not None
-    method = row["method"]
+    method = record["method"]
     start = plan.start
     goals = {AS_SEEN: seen.poses, AS_CORRECTED: plan.target_poses}
     if method == "uncorrected" or np.array_equal(seen.poses, plan.target_poses):
@@ -70,20 +70,20 @@ def trial_story(
         world=scene.work,
         start=start,
         moments=tuple(track.moments),
-        ending=ending(row),
-        good=row["success"],
+        ending=ending(record),
+        good=record["success"],
     )
     true = goals.get(AS_TRUE, plan.target_poses)
     return Rollout(scene, (*segments, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
 
 
-def ending(row: TrialRecord) -> str:
+def ending(record: TrialRecord) -> str:
     """How a replay ended: `failure at operation 3 (force_stop): the motion .. was stopped`."""
-    if row["success"]:
-        return f"success: {row['sentence']}"
-    operation = row["failure_operation"]
+    if record["success"]:
+        return f"success: {record['sentence']}"
+    operation = record["failure_operation"]
     where = "" if operation is None else f" at operation {operation}"
-    return f"failure{where} ({row['failure_code']}): {row['sentence']}"
+    return f"failure{where} ({record['failure_code']}): {record['sentence']}"
 
 
 def _demonstration(spec: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Segment:

@@ -167,7 +167,7 @@ def observation_failure(observation: Observation) -> Outcome | None:
 
 
 def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> Predicted:
-    """What plan and arm say before it is carried out, as it stands in a row: operations from 1, mm.
+    """What plan and arm say before it is carried out, as it stands in a record: operations from 1, mm.
 
     Args:
         plan: With the contacts that the planner was given; which are the true ones is not known here.
@@ -189,7 +189,7 @@ def draw_robot_error(name: str, scene: Scene, seed: int, secret_seed: SecretSeed
     """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
 
     Args:
-        name: As in a row.
+        name: As in a record.
     """
     if name == NO_ROBOT_ERROR:
         return None
@@ -203,7 +203,7 @@ def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...
     the tip, and turns about their normal, the first.
 
     Args:
-        name: As in a row.
+        name: As in a record.
         drawn: Draws so many standard normal numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
     """
     sigmas = robot_sigmas(name)

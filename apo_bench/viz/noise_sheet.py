@@ -86,7 +86,8 @@ def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample, headin
         return f"{facts}\nNo operation of {SCENARIO} was observed.\n"
     missed = f"; {100 * sample.missed:.1f} % were not observed" if sample.missed else ""
     count = f"{len(sample.errors)} operations of {SCENARIO}{missed}"
-    return "\n".join([facts, f"Errors {_describe_level(model, noise_level)}, {count}:", "", *_tabulate(sample), ""])
+    level = f"noise mm {noise_level.mm:g} and noise deg {noise_level.deg:g}"
+    return "\n".join([facts, f"Errors at {level}, {count}:", "", *_tabulate(sample), ""])
 
 
 def describe_model(model: Any, heading: int = 1) -> str:
@@ -100,15 +101,6 @@ def describe_model(model: Any, heading: int = 1) -> str:
     formula = "\n".join(f"    {line}" for line in facts.formula)
     bullets = "\n".join(f"- {line}." for line in lines)
     return "\n\n".join(filter(None, (f"{'#' * heading} {name}: {facts.title}", formula, bullets))) + "\n"
-
-
-def _describe_level(model: Any, noise_level: NoiseLevel) -> str:
-    if find_facts(model).measured:
-        return f"at {noise_level.mm:g} times the measured mm and {noise_level.deg:g} times the measured degrees"
-    named = isinstance(model, str) and model.partition(":")[0] in NOISES
-    if named or isinstance(_resolve_model(model), type):
-        return f"at {noise_level.mm:g} mm and {noise_level.deg:g} deg"
-    return "at every noise level"
 
 
 def _tabulate(sample: ErrorSample) -> Iterator[str]:

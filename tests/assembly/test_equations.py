@@ -60,7 +60,7 @@ def long_words() -> scenes.Scene:
 def differences(scene: scenes.Scene, by: float = 1e-6) -> tuple[Array, Array]:
     """The analytic Jacobian and the one of central differences, by body twists of every goal."""
     system = contact_equations(scene.assembly, scene.start, scene.goals)
-    _, J = system.linearised(scene.goals)
+    _, J = system.linearise(scene.goals)
     numeric = np.zeros_like(J)
     for k in range(len(scene.goals)):
         for i in range(6):
@@ -119,8 +119,8 @@ def scenes_area(face) -> float:
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     scene = random_scene(seed)
     moved = scenes.turned(scene, pose.exp(np.random.default_rng(seed).standard_normal(6)))
-    e, J = contact_equations(scene.assembly, scene.start, scene.goals).linearised(scene.goals)
-    e_moved, J_moved = contact_equations(moved.assembly, moved.start, moved.goals).linearised(moved.goals)
+    e, J = contact_equations(scene.assembly, scene.start, scene.goals).linearise(scene.goals)
+    e_moved, J_moved = contact_equations(moved.assembly, moved.start, moved.goals).linearise(moved.goals)
     assert_allclose(e_moved, e, atol=1e-12)
     assert_allclose(J_moved, J, atol=1e-12)
 
@@ -150,7 +150,7 @@ def with_free(system: Equations, free: set[int] | None) -> Equations:
 def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) -> None:
     scene = scenes.ALL[name]()
     columns = range(len(scene.goals)) if free is None else free
-    e, J = with_free(contact_equations(scene.assembly, scene.start, scene.goals), free).linearised(scene.goals)
+    e, J = with_free(contact_equations(scene.assembly, scene.start, scene.goals), free).linearise(scene.goals)
     chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
     scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
     assert [least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import arms, robot_errors, robust, round
+from benchmarks.provenance import count_revisions, mujoco_of
 from benchmarks.rates_by_condition import group, rate_of, read_judged
 from benchmarks.wrong_contacts import PAGE, read, section
 
@@ -43,3 +44,8 @@ def test_half_the_time_step_is_compared_seed_by_seed() -> None:
     lines = list(round.half_step(group(ROWS, round.place_of), other))
     assert lines[-1] == ["all", len(ROWS), f"{len(ROWS)} (100.0 %)"]
     assert "## Success" in "\n".join(round.page(group(ROWS, round.place_of), other))
+
+
+def test_a_page_states_what_its_sweeps_ran_with() -> None:
+    assert count_revisions([SWEEP, SWEEP]) == 1
+    assert len(mujoco_of([SWEEP])) == 1

@@ -37,7 +37,7 @@ def test_each_kind_fixes_what_a_table_says(kind):
     assert largest_gap(observation.assembly, observation.start, truth) < 1e-12
     found = explain(observation, truth).operations[1]
     assert (found.rank, found.fixed) == (CONTACTS[kind][2], BY_HAND[kind])
-    _, J = contact_equations(observation.assembly, observation.start, truth).linearised(truth)
+    _, J = contact_equations(observation.assembly, observation.start, truth).linearise(truth)
     assert np.linalg.matrix_rank(J[:, 6:] / np.repeat([1.0, 0.04], 3), tol=1e-6) == CONTACTS[kind][2]
 
 
@@ -45,7 +45,7 @@ def test_each_kind_fixes_what_a_table_says(kind):
 def test_jacobian_is_that_of_finite_differences(kind):
     observation, _ = case(kind)
     system = contact_equations(observation.assembly, observation.start, observation.poses)
-    _, J = system.linearised(observation.poses)
+    _, J = system.linearise(observation.poses)
     step = 1e-6
     for column in range(12):
         xi = np.zeros((2, 6))

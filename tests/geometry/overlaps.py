@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, Posed
 from apo_bench.geometry.solid import all_boxes
-from apo_bench.geometry.swept import _ANYWHERE, _SLACK_M, _boxed, _exactly
+from apo_bench.geometry.swept import _ANYWHERE, _SLACK_M, _box_spans, _exactly
 
 
 def overlap_intervals(
@@ -19,7 +19,7 @@ def overlap_intervals(
         slack_m: Negative: pieces count that are still this far apart.
         within: Overlaps that end before or begin after these places may be left out, [m].
     """
-    pairs, spans = _boxed(moving, way, resting, slack_m, within)
+    pairs, spans = _box_spans(moving, way, resting, slack_m, within)
     if all_boxes(moving.pieces) and all_boxes(resting.pieces):
         return spans
     near = (spans[:, 1] > within[0]) & (spans[:, 0] < within[1])

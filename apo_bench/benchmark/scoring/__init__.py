@@ -1,1 +1,1 @@
-"""One score for a method: tracks of fixed trials, an entry in a file, a table of entries."""
+"""Scores of methods: tracks of fixed trials, entries in files, the leaderboard."""

@@ -37,15 +37,15 @@ def score(
     said: Callable[[Track], None] = lambda _: None,
     **how: Any,
 ) -> Entry:
-    """What a method scores in tracks.
+    """Score a method in tracks.
 
     Args:
         method: As for `run_sweep`.
-        rows: The folder of the rows, one folder below it for each track and arm; continued if it holds rows of the
+        rows: The folder of the records, with a folder for each track and arm; continued if it holds records of the
             same trials.
-        name: What tables call it; None for the method's.
+        name: In tables. Default: the method.
         quick: A few seeds of each condition, to check that it works.
-        command: What to note as the command line.
+        command: The command line, for the entry.
         said: Called with each track before it runs.
         how: As for `run_sweep`: `workers`, `backend`, `secret_seed_file`.
 

@@ -1,1 +1,1 @@
-"""Many trials: which there are, who runs them, where their rows go."""
+"""Sweeps: the trials of grids, the processes that run them, the folder of their records."""

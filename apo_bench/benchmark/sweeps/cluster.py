@@ -1,6 +1,6 @@
 """A Ray cluster whose nodes share the batches of a sweep; each node runs them as this machine would.
 
-Only the process that started the sweep writes rows. A node that is lost has its batches run again elsewhere.
+Only the process that started the sweep writes records. A node that is lost has its batches run again elsewhere.
 """
 
 import importlib.util
@@ -29,7 +29,7 @@ _TOUCH_S = 5.0
 _AHEAD = 2
 """So many tasks for each CPU are handed out: one runs, the others wait."""
 _OBJECT_STORE = 100 * 2**20
-"""Bytes, of a cluster that is started here; rows are small."""
+"""Bytes, of a cluster that is started here; records are small."""
 _SETTINGS = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
@@ -109,7 +109,7 @@ def run_on_cluster(
         raise kind(str(error.cause)) from error
     except RayError as error:
         raise RuntimeError(
-            f"the Ray cluster was lost ({' '.join(str(error).split())[:200]}); finished rows are kept, and the same "
+            f"the Ray cluster was lost ({' '.join(str(error).split())[:200]}); finished records are kept, and the same "
             "command goes on."
         ) from error
     finally:
@@ -122,7 +122,7 @@ def run_on_node(batch: Batch, inputs: SweepInputs, limit_s: float) -> list[Ended
 
     node = {"node": ray.get_runtime_context().get_node_id()}
     ended: list[Ended] = []
-    run_in_pool(_pool_of_node(), [batch], inputs, 1, limit_s, lambda row, wall: ended.append((row, wall | node)))
+    run_in_pool(_pool_of_node(), [batch], inputs, 1, limit_s, lambda record, wall: ended.append((record, wall | node)))
     return ended
 
 

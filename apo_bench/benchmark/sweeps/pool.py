@@ -1,7 +1,7 @@
 """Local processes that share the batches of a sweep, or run one trial; one that dies or hangs costs one trial.
 
 A batch whose process dies, or that takes longer than a trial may, runs again trial by trial: so the one that is to
-blame has the failed row.
+blame has the failed record.
 """
 
 import math
@@ -29,7 +29,7 @@ from apo_bench.trial.endings import record_lost_trial
 from apo_bench.trial.request import Request, checked_request, record_lost_request, run_request
 
 Emit = Callable[[TrialRecord, Timing], None]
-"""Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
+"""Takes the record of a trial that has ended; every trial of a sweep yields exactly one."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Workers have one thread per linear algebra library: the processes already fill the cores."""
 _MOST_BATCHES = 200
@@ -96,15 +96,15 @@ def run_in_pool(
 def _take(future: Future[list[Ended]], batch: Batch, inputs: SweepInputs, emit: Emit) -> list[Batch]:
     """Emit what came of a batch, and return the batches to be run in its place."""
     try:
-        for row, wall in future.result():
-            emit(row, wall)
+        for record, wall in future.result():
+            emit(record, wall)
         return []
     except (ProcessExpired, TimeoutError) as error:
         if len(batch) > 1:
             return [(trial,) for trial in batch]
         (trial,) = batch
-        row = record_lost_trial(trial, inputs.content[trial.scenario], _code_of(error))
-        emit(row, timing(row, None, None, None, {"worker": getattr(error, "pid", None)}))
+        record = record_lost_trial(trial, inputs.content[trial.scenario], _code_of(error))
+        emit(record, timing(record, None, None, None, {"worker": getattr(error, "pid", None)}))
         return []
 
 
@@ -120,8 +120,8 @@ def run_request_alone(request: Request, limit_s: float) -> TrialRecord:
     check_limit(limit_s)
     with stop_at_signals(), process_pool(1) as pool:
         try:
-            row: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
-            return row
+            record: TrialRecord = pool.schedule(run_request, [request], timeout=limit_s).result()
+            return record
         except (ProcessExpired, TimeoutError) as error:
             return record_lost_request(request, settings, scenario, _code_of(error))
 

@@ -1,4 +1,4 @@
-"""Many trials: spread over processes or machines, rows written as their batches end, resumed where it was left."""
+"""Run sweeps over processes or machines; the parent writes the records, and an interrupted sweep resumes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -53,30 +53,29 @@ def run_sweep(
     command: str = "",
     secret_seed_file: str | Path | None = None,
 ) -> list[TrialRecord]:
-    """Run every trial of a sweep that has no row yet.
+    """Run every trial of a sweep that has no record yet.
 
-    The rows depend on neither the number of workers, nor where they run, nor the order in which trials end.
+    The records depend on neither the number of workers, nor where they run, nor the order in which trials end.
 
     Args:
         grids: One, or several whose trials are united.
-        out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
+        out: The folder of the records; made if it does not exist, continued if it holds records of the same sweep.
         workers: Processes; they are spawned, so a script that calls this needs the usual
-            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit. With
-            `ray`, None stands for all that the cluster has.
-        limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
+            `if __name__ == "__main__":`. None: with `local` this process, without a limit for trials; with `ray` all
+            workers of the cluster.
+        limit_s: Wall time of a trial in a worker; one that takes longer gets a failed record.
         backend: `local`, or `ray` for a cluster.
-        address: Of a cluster that runs already.
-        command: What to note in `run.json` as the command line.
-        salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
-            draw.
+        address: Of a running cluster.
+        command: The command line, for `run.json`.
+        secret_seed_file: File of the secret seed, made if it does not exist; None for trials that anyone can draw.
 
     Returns:
-        All rows of the folder, in the order in which they were written.
+        All records of the folder, in the order in which they were written.
 
     Raises:
         InputError: A setting that is not allowed, or a folder with trials of another sweep.
-        RuntimeError: A trial could not be run, or a row could not be written.
-        KeyboardInterrupt: After Ctrl-C or a signal; the rows of the batches that had ended are written.
+        RuntimeError: A trial could not be run, or a record could not be written.
+        KeyboardInterrupt: After Ctrl-C or a signal; the records of the batches that had ended are written.
     """
     grids = (grids,) if isinstance(grids, SweepConfig) else tuple(grids)
     _check_executor(workers, limit_s, backend, address)
@@ -105,8 +104,8 @@ def run_sweep(
         batches = list(_left(units(grids, loaded, secret_seed), loaded, inputs, store))
         with progress(sum(map(len, batches))) as count:
 
-            def emit(row: TrialRecord, timing: Timing) -> None:
-                store.append(row, timing)
+            def emit(record: TrialRecord, timing: Timing) -> None:
+                store.append(record, timing)
                 count()
 
             if here:
@@ -129,7 +128,7 @@ def run_sweep(
 def _left(
     work: Iterable[Batch], loaded: Mapping[str, Scenario], inputs: SweepInputs, store: RunFolder
 ) -> Iterator[Batch]:
-    """Batches of the trials that have no row yet; the rows that there are must be what those trials would give."""
+    """Batches of the trials without a record; existing records must be those that the trials would give."""
     hashes: dict[TrialConfig, str] = {}
     for unit in work:
         left = []
@@ -142,7 +141,7 @@ def _left(
                 hashes[cell] = config_hash(trial, inputs.content[trial.scenario])
             require(
                 found is None or found == hashes[cell],
-                f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                f"'{store.folder}' holds a record of {loaded[trial.scenario].name}, method {trial.method}, seed "
                 f"{trial.seed}, that was made with other files, versions or settings; choose another folder.",
             )
         for first in range(0, len(left), BATCH):
@@ -167,7 +166,7 @@ def _check_executor(workers: int | None, limit_s: float, backend: str, address: 
 
 
 def _check_names(grids: Sequence[SweepConfig]) -> None:
-    """Raise an `InputError` unless noise models, relations and correctors can be had here."""
+    """Raise an `InputError` unless noise models, contact sources and correctors can be imported here."""
     for grid in grids:
         highest = max(max(noise_pair(noise_level)) for noise_level in grid.noise_level)
         for noise in grid.noise:

@@ -20,7 +20,7 @@ def travelling_files(
 
     Args:
         loaded: Every scenario by what was given for it.
-        names: Methods, noise models, relations and the arm.
+        names: Methods, noise models, contact sources and the arm.
     """
     files = [*arm_files]
     for source, scenario in loaded.items():

@@ -1,4 +1,4 @@
-"""What a worker does, in whatever process on whatever machine: batches of trials become rows."""
+"""A worker: it runs batches of trials, in any process on any machine."""
 
 import platform
 import time
@@ -23,10 +23,10 @@ Ended = tuple[TrialRecord, Timing]
 @final
 @dataclass(frozen=True)
 class SweepInputs:
-    """What all rows of a sweep are made with, as the process that started it found it."""
+    """Inputs of all records of a sweep, from the process that started it."""
 
     content: Mapping[str, str]
-    """What was given for a scenario -> its `content_hash`."""
+    """Name or path of a scenario -> its `content_hash`."""
     versions: Mapping[str, str]
     """Package -> version."""
 
@@ -67,9 +67,9 @@ class Worker:
             compiled = time.perf_counter()
             simulated = simulated or demonstration_of(spec, scene)
             shown = time.perf_counter()
-            row = record_trial(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
+            record = record_trial(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
             ended = time.perf_counter()
-            yield row, timing(row, compiled - start, shown - compiled, ended - shown, self._name)
+            yield record, timing(record, compiled - start, shown - compiled, ended - shown, self._name)
 
     def _scene(self, spec: TrialConfig) -> Scene:
         key = scene_key(spec)
@@ -86,7 +86,7 @@ class Worker:
 
 
 def timing(
-    row: TrialRecord,
+    record: TrialRecord,
     compile_s: float | None,
     demonstrate_s: float | None,
     trial_s: float | None,
@@ -94,7 +94,7 @@ def timing(
 ) -> Timing:
     """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
     return {
-        **dict(zip(KEY, record_key(row), strict=True)),
+        **dict(zip(KEY, record_key(record), strict=True)),
         "compile_s": compile_s,
         "demonstrate_s": demonstrate_s,
         "trial_s": trial_s,

@@ -33,11 +33,11 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
         InputError: A covariance is not positive definite.
     """
     return run_method(
-        observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
+        observation, lambda observation: _solve(observation, contact_m), "the least sum of squares was looked for"
     )
 
 
-def _solved(observation: Observation, contact_m: float) -> Array:
+def _solve(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
     space = whitened(observation)
@@ -48,7 +48,7 @@ def _solved(observation: Observation, contact_m: float) -> Array:
         return np.concatenate([system.residual(space.poses(z)) / contact_m, z])
 
     def jacobian(z: Array) -> Array:
-        _, J = system.linearised(space.poses(z))
+        _, J = system.linearise(space.poses(z))
         return np.concatenate([space.pull_back(z, J) / contact_m, prior])
 
     settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}

@@ -49,7 +49,7 @@ def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, l
     """
     return run_method(
         observation,
-        lambda observation: _descended(observation, contact_m, length),
+        lambda observation: _descend(observation, contact_m, length),
         f"the descent ended after {ADAM_STEPS} steps",
     )
 
@@ -70,7 +70,7 @@ class Loss:
         value = float(z @ z)
         gradient = 2 * z
         for system in (self.contacts, intruding(self.meetings, poses)):
-            e, J = system.linearised(poses)
+            e, J = system.linearise(poses)
             value += float(e @ e) / self.contact_m**2
             gradient = gradient + 2 * (e @ self.space.pull_back(z, J)) / self.contact_m**2
         return value, gradient
@@ -82,7 +82,7 @@ def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 
-def _descended(observation: Observation, contact_m: float, length: float) -> Array:
+def _descend(observation: Observation, contact_m: float, length: float) -> Array:
     down = loss(observation, contact_m)
     z = np.zeros(6 * len(observation.poses))
     m = np.zeros_like(z)

@@ -25,10 +25,10 @@ def snap(observation: Observation) -> Correction:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return run_method(observation, _snapped, "every part was put onto its newest support")
+    return run_method(observation, _snap_all, "every part was put onto its newest support")
 
 
-def _snapped(observation: Observation) -> Array:
+def _snap_all(observation: Observation) -> Array:
     poses = np.array(observation.poses)
     space = whitened(observation)
     system = contact_equations(observation.assembly, observation.start, poses)
@@ -48,7 +48,7 @@ def _put(own: Equations, poses: Array, k: int, space: Whitened) -> Array:
     now = np.array(poses)
     z = np.zeros(6)
     for _ in range(_ITERATIONS):
-        e, J = own.linearised(now)
+        e, J = own.linearise(now)
         if not e.size:
             break
         U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / TWIST_UNITS, full_matrices=False)

@@ -110,16 +110,16 @@ def _equations(felt: list[NumberedTouch], joints: int) -> TouchEquations:
 def _most_probable(equations: TouchEquations, sigmas: Array, middle: Array) -> tuple[Array, Array, Array]:
     """The z that minimises |z|^2 + |residuals|^2, and the residuals near it, A z - y."""
     z = np.zeros(len(sigmas))
-    A, y = _linearised(equations, sigmas, middle, z)
+    A, y = _linearise(equations, sigmas, middle, z)
     for _ in range(_MOST_STEPS):
         before = z
         R = _triangle(A)
         most = _sum(z, A, y) * (1.0 + _ROUNDING)
         z = np.linalg.solve(R, np.linalg.solve(R.T, A.T @ y))
-        A, y = _linearised(equations, sigmas, middle, z)
+        A, y = _linearise(equations, sigmas, middle, z)
         while _sum(z, A, y) > most and np.abs(z - before).max() >= _SMALL:  # too far: half the way
             z = 0.5 * (before + z)
-            A, y = _linearised(equations, sigmas, middle, z)
+            A, y = _linearise(equations, sigmas, middle, z)
         if np.abs(z - before).max() < _SMALL:
             break
     return z, A, y
@@ -131,7 +131,7 @@ def _sum(z: Array, A: Array, y: Array) -> float:
     return float(z @ z + off @ off)
 
 
-def _linearised(equations: TouchEquations, sigmas: Array, middle: Array, z: Array) -> tuple[Array, Array]:
+def _linearise(equations: TouchEquations, sigmas: Array, middle: Array, z: Array) -> tuple[Array, Array]:
     """A (t, u) and y (t,): near z the residual of each touch, over its sigma, is A z - y."""
     T, D = part_poses(sigmas * z, middle, equations.places)
     points = equations.points[:, :, None]

@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation, contact_equations, largest, largest_gap, project_observation
 from apo_bench.correction.checks.status import refuse_correction, status_sentence
-from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, demanded, least_step, violations
+from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, demands_of, least_step, violations
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 
@@ -25,7 +25,7 @@ def poses_as_given(observation: Observation, poses: Array, sentence: str) -> Cor
     before = largest_gap(observation.assembly, observation.start, observation.poses)
     if not np.isfinite(poses).all():
         return Correction(observation.poses, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    e, J = contact_equations(observation.assembly, observation.start, poses).linearised(poses)
+    e, J = contact_equations(observation.assembly, observation.start, poses).linearise(poses)
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(poses)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((poses != observation.poses).any(axis=(1, 2)))[::-1])
     after = largest(e)
@@ -41,7 +41,7 @@ def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()
     """
     observation = project_observation(observation)
     plain = contact_equations(observation.assembly, observation.start, observation.poses)
-    system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
+    system, exact, inequalities = demands_of(plain, observation.assembly, observation.play_m)
     return largest(violations(system, exact, inequalities, poses)[observation.assembly.without(dropped)])
 
 

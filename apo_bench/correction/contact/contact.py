@@ -87,7 +87,7 @@ class ContactCorrector:
             for observation in observations
         )
         for batch in ([i] for i in whole) if alone else [whole] if whole else []:
-            for i, correction in zip(batch, self._corrected([observations[i] for i in batch]), strict=True):
+            for i, correction in zip(batch, self._correct([observations[i] for i in batch]), strict=True):
                 results[i] = correction
         return [correction for correction in results if correction is not None]
 
@@ -99,7 +99,7 @@ class ContactCorrector:
         (before_m,) = problem.seen_gap_m()
         return check_facing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
-    def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
+    def _correct(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
         problem = problem_of(observations, self.level, self.compiled)
         corrections = []

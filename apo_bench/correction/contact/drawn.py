@@ -29,7 +29,7 @@ def drawn_chi_squares(
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
         left_out: Operations whose poses are inferred, so that they agree with their contacts.
     """
-    r = _drawn(observation, L, left_out) @ Jt
+    r = _draw(observation, L, left_out) @ Jt
     # As `soft_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
     A = Jt.T @ Jt
     if S is not None:
@@ -49,10 +49,10 @@ def drawn_p_value(drawn: Array, chi_square: float) -> float:
 
 def drawn_radius(observation: Observation, L: Array, free: Array, level: float) -> float:
     """The squared length within which a part `level` of errors in the free directions are, (6 n, f), of z."""
-    return float(np.quantile(np.square(_drawn(observation, L) @ free).sum(axis=1), level))
+    return float(np.quantile(np.square(_draw(observation, L) @ free).sum(axis=1), level))
 
 
-def _drawn(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) -> Array:
+def _draw(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) -> Array:
     """z of errors, (DRAWS, 6 n); of operations that are left out of none."""
     if observation.tails is None:
         raise ValueError("the observation states no tails")

@@ -1,4 +1,4 @@
-"""Where operations led whose observation is missing or not assumed: inferred from their contacts and what is around.
+"""Where operations led whose observation is missing or rejected: inferred from their contacts and what is around.
 
 A contact says that two normals oppose, that a point lies in a plane, and that two faces cover each other, so their
 middles are not far apart; or that two axes are one line. With the poses of all other operations in its equations known,
@@ -90,7 +90,7 @@ def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredP
         conditions = {k: _conditions(observation.assembly, start, poses, k, left) for k in sorted(left)}
         k = max(conditions, key=lambda k: (_rank(conditions[k]), len(conditions[k]), -k))
         if conditions[k]:
-            poses[k] = _placed(conditions[k], poses[k])
+            poses[k] = _place(conditions[k], poses[k])
         else:
             baseless.append(k)
         left.discard(k)
@@ -170,10 +170,10 @@ def _directions(own: Array) -> int:
     return int((np.linalg.svd(own, compute_uv=False) > _APART).sum())
 
 
-def _placed(conditions: Sequence[_Condition], seen: Array) -> Array:
+def _place(conditions: Sequence[_Condition], seen: Array) -> Array:
     """The pose that agrees best with what is stated; what is not said of its orientation is as it was observed."""
     T = np.eye(4)
-    T[:3, :3] = R = _turned(conditions, seen[:3, :3])
+    T[:3, :3] = R = _turn(conditions, seen[:3, :3])
     # The position minimises the squares of what each condition leaves: exact along the directions that a plane says,
     # and as vague as the face is large across them.
     exact = [condition.exact(R) for condition in conditions]
@@ -201,10 +201,10 @@ def _across(ways: Array) -> Array:
     return np.asarray(known.T @ known)
 
 
-def _turned(conditions: Sequence[_Condition], seen: Array) -> Array:
+def _turn(conditions: Sequence[_Condition], seen: Array) -> Array:
     """(3, 3): normals oppose, axes point the way that fits best; what is left of a shaft on a plane turns the least."""
     sure = [condition for condition in conditions if condition.ends.lie != "across"]
-    R = _sensed(sure, seen) if sure else seen
+    R = _choose_senses(sure, seen) if sure else seen
     if len(sure) == len(conditions) or _rank(sure) > 1:
         return R
     own = np.array([condition.own for condition in conditions])
@@ -224,23 +224,23 @@ def _beside(direction: Array, way: Array) -> Array:
     return across / size if size > _APART else np.asarray(np.linalg.svd(way[None])[2][1])
 
 
-def _sensed(conditions: Sequence[_Condition], seen: Array) -> Array:
+def _choose_senses(conditions: Sequence[_Condition], seen: Array) -> Array:
     """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was observed."""
     own, way = (np.array([getattr(condition, name) for condition in conditions]) for name in ("own", "way"))
     axes = [i for i, condition in enumerate(conditions) if condition.ends.lie == "along"]
     if not axes:
-        return _fitted(own, way, conditions[0].beside, seen)
+        return _fit(own, way, conditions[0].beside, seen)
     tried = list[tuple[float, float, Array]]()
     likely = tuple(np.where(np.einsum("ki,ij,kj->k", way[axes], seen, own[axes]) < 0.0, -1.0, 1.0))
     for signs in pairs((1.0, -1.0), repeat=len(axes)) if len(axes) <= _MOST_AXES else (likely,):
         ways = np.array(way)
         ways[axes] *= np.array(signs)[:, None]
-        R = _fitted(own, ways, conditions[0].beside, seen)
+        R = _fit(own, ways, conditions[0].beside, seen)
         tried.append((round(float((ways * (own @ R.T)).sum()), 3), float(np.trace(R.T @ seen)), R))
     return max(tried, key=lambda condition: condition[:2])[2]
 
 
-def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
+def _fit(own: Array, way: Array, beside: Array, seen: Array) -> Array:
     """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
     # One direction leaves the turn about it: of the quarter turns of the other part the nearest one is taken.
     rank = _directions(own)

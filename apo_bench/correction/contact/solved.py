@@ -65,11 +65,11 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
     chi_square, simple = chi_squares(problem, chosen, nearest)
     if problem.observation.tails is not None or not (problem.demands.all_exact or problem.demands.exact[kept].all()):
         simple[:] = False
-    solutions = _solved(problem, kept, nearest, chi_square.tolist())
+    solutions = _describe(problem, kept, nearest, chi_square.tolist())
     return [
         solved
         if easy and solved.kept_m <= observation.gap_m
-        else _solved_in_full(problem.only(i), kept, nearest.at(i).batch())
+        else _describe_in_full(problem.only(i), kept, nearest.at(i).batch())
         for i, (observation, easy, solved) in enumerate(
             zip(problem.observations, simple.tolist(), solutions, strict=True)
         )
@@ -100,7 +100,9 @@ def turned_far(observed: Array, poses: Array) -> NDArray[np.bool_]:
     return np.asarray(traces.min(axis=1, initial=3.0) < _FAR)
 
 
-def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses, chi_square: list[float]) -> list[Solved]:
+def _describe(
+    problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses, chi_square: list[float]
+) -> list[Solved]:
     """What is to say of each of the nearest poses, given the squared lengths of corrections, (b,)."""
     all_kept = bool(kept.all())
     poses = nearest.poses
@@ -121,7 +123,7 @@ def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses, ch
     ]
 
 
-def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses) -> Solved:
+def _describe_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestPoses) -> Solved:
     """The same of one observation whose contacts contradict each other, or that has walls or tails.
 
     Active inequalities count like equations: given which they are, the squared length is chi-square
@@ -140,5 +142,5 @@ def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestP
         chi_square += float(held.z @ held.z - start.z @ start.z)
         degrees += active_rank(start.Jt, inequalities, held)
         nearest = held.batch()
-    (solved,) = _solved(problem, kept, nearest, [chi_square])
+    (solved,) = _describe(problem, kept, nearest, [chi_square])
     return solved._replace(test=chi_square_test(problem, chosen, nearest, chi_square, degrees))

@@ -91,7 +91,7 @@ def _begun_at(problem: Problem, poses: Array) -> Problem:
 def _starts(problem: Problem, first: Solved) -> Array:
     """Poses to begin with, (b, n, 4, 4)."""
     observation = problem.observation
-    doubted = _doubted(problem, first)
+    doubted = _find_doubtful(problem, first)
     n = len(observation.poses)
     starts = [infer_poses(observation, some).poses for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.poses]
@@ -104,7 +104,7 @@ def _starts(problem: Problem, first: Solved) -> Array:
     return np.array([*starts, *(poses for poses, count in zip(turned, away, strict=True) if count < away[0])])
 
 
-def _doubted(problem: Problem, first: Solved) -> Collection[int]:
+def _find_doubtful(problem: Problem, first: Solved) -> Collection[int]:
     """The operations that may be far off: all, or those with a part in most contacts that do not hold."""
     observation = problem.observation
     n = len(problem.observation.poses)

@@ -32,13 +32,13 @@ def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
     if len(considered) > MOST_SUSPECTS:
         size = pull(problem, kept)
         considered = sorted(sorted(considered, key=lambda i: -size[list(arcs[i])].sum())[:MOST_SUSPECTS])
-    return _ranked(problem, kept, [(f"R{i + 1}", arcs[i]) for i in considered])
+    return _rank(problem, kept, [(f"R{i + 1}", arcs[i]) for i in considered])
 
 
 def contact_suspects(problem: Problem, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
     """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
     single = contacts_of(problem.observation.assembly, relation)
-    return _ranked(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
+    return _rank(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
 
 
 def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]:
@@ -51,7 +51,7 @@ def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]
     return {f"{relation}: {contact}": group for contact, group in together.items()}
 
 
-def _ranked(
+def _rank(
     problem: Problem, kept: NDArray[np.bool_], groups: Sequence[tuple[str, tuple[int, ...]]]
 ) -> tuple[Suspect, ...]:
     """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""

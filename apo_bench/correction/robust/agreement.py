@@ -19,7 +19,7 @@ from apo_bench.correction.robust.hypotheses import (
     soften,
     untrusted_operations,
 )
-from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearise_by, noise_factor
 
 _LEVER_M = 0.1
 """What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
@@ -34,7 +34,7 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assum
     left_out = untrusted_operations(states)
     wide = np.array(assumed.covariance)
     wide[list(left_out)] = ROOM
-    e, Jt = linearised_by(seen_system(assumed), assumed.poses, noise_factor(replace(assumed, covariance=wide)))
+    e, Jt = linearise_by(seen_system(assumed), assumed.poses, noise_factor(replace(assumed, covariance=wide)))
     _, soft = soften(assumed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)
@@ -58,7 +58,7 @@ class ContactAgreement:
         seen = assumed_observation(case, states)
         self._unknown = untrusted_operations(states)
         system = seen_system(seen)
-        self._e, self._Jt = linearised_by(system, seen.poses, noise_factor(seen))
+        self._e, self._Jt = linearise_by(system, seen.poses, noise_factor(seen))
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)

@@ -39,7 +39,7 @@ from apo_bench.correction.robust.noise_scale import (
     scaled_test,
 )
 from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merge_views
-from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearise_by, noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 as_begun = ContactCorrector("apply", elsewhere=False)
@@ -80,7 +80,7 @@ class SolvedHypothesis:
     case: Case
     states: States
     dropped: tuple[str, ...]
-    """Relations that are not assumed."""
+    """Relations that are rejected."""
     observation: Observation
     """Views merged, and operations of which none is assumed where contacts say, with `UNKNOWN`."""
     correction: Correction
@@ -94,12 +94,12 @@ class SolvedHypothesis:
 
     @property
     def left_out(self) -> tuple[int, ...]:
-        """Operations of which no view is assumed."""
+        """Operations whose views are all rejected."""
         return untrusted_operations(self.states)
 
     @property
     def doubts(self) -> bool:
-        """Whether anything is not assumed as it was stated."""
+        """Whether anything is not taken as stated."""
         return (
             bool(self.dropped)
             or self.scale > 1.0
@@ -121,7 +121,7 @@ class SolvedHypothesis:
         system = seen_system(observation)
         xi = pose.log(pose.inverse(observation.poses) @ correction.poses)
         L = noise_factor(replace(observation, covariance=wide))
-        _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
+        _, Jt = linearise_by(system, correction.poses, right_jacobian(xi) @ L)
         wrong, soft = soften(observation, self.dropped)
         false = np.where(wrong, system.residual(correction.poses) / soft, 0.0) if self.dropped else np.zeros(len(soft))
         S = Jt.T @ Jt + np.diag(soft * soft)
@@ -156,16 +156,16 @@ class SolvedHypothesis:
 
     def at(self, poses: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred poses of some operations elsewhere, at these of poses (n, 4, 4)."""
-        moved = self._moved(poses, unknown)
-        correction = retest(moved, _corrected(moved, self.dropped), self.left_out)
+        moved = self._move(poses, unknown)
+        correction = retest(moved, _correct(moved, self.dropped), self.left_out)
         return replace(self, observation=moved, correction=correction)
 
     def poses_at(self, poses: Array, unknown: Sequence[int]) -> Array | None:
         """Its poses, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
-        correction = _corrected(self._moved(poses, unknown), self.dropped)
+        correction = _correct(self._move(poses, unknown), self.dropped)
         return correction.poses if correction.ok and self.stands_at(correction.poses) else None
 
-    def _moved(self, poses: Array, unknown: Sequence[int]) -> Observation:
+    def _move(self, poses: Array, unknown: Sequence[int]) -> Observation:
         there = np.array(self.observation.poses)
         there[list(unknown)] = poses[list(unknown)]
         return replace(self.observation, poses=there)
@@ -192,7 +192,7 @@ class SolvedHypothesis:
 
 
 def untrusted_operations(states: States) -> tuple[int, ...]:
-    """Operations of which no view is assumed."""
+    """Operations whose views are all rejected."""
     return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
@@ -226,7 +226,7 @@ def hypothesis(
     if assumed is None:
         assumed = assumed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
-    correction = as_stated(assumed) if trusted else _corrected(assumed, dropped)
+    correction = as_stated(assumed) if trusted else _correct(assumed, dropped)
     return SolvedHypothesis(case, states, dropped, assumed, retest(assumed, correction, untrusted_operations(states)))
 
 
@@ -241,14 +241,14 @@ def retest(assumed: Observation, correction: Correction, left_out: tuple[int, ..
     kept = assumed.assembly.without(correction.dropped)
     system = seen_system(assumed).among(kept)
     n = len(correction.poses)
-    own = linearised_by(system, correction.poses, np.tile(np.eye(6), (n, 1, 1)))[1]
+    own = linearise_by(system, correction.poses, np.tile(np.eye(6), (n, 1, 1)))[1]
     own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
     freedom = max(0, correction.test.freedom - jacobian_rank(own))
     p = p_value(correction.test.chi_square, freedom)
     if assumed.tails is not None and freedom:
         L = noise_factor(assumed)
         xi = pose.log(pose.inverse(assumed.poses) @ correction.poses)
-        _, Jt = linearised_by(system, correction.poses, right_jacobian(xi) @ L)
+        _, Jt = linearise_by(system, correction.poses, right_jacobian(xi) @ L)
         play = problem_of((assumed,)).play_covariance(kept)
         drawn = drawn_chi_squares(assumed, L, Jt, play, left_out)
         p = drawn_p_value(drawn, correction.test.chi_square)
@@ -262,7 +262,7 @@ def as_stated(observation: Observation) -> Correction:
 
 
 def assumed_observation(case: Case, states: States) -> Observation:
-    """Views merged, and what is not assumed inferred; shared errors and tails of several views are not kept."""
+    """Views merged, and what is rejected inferred; shared errors and tails of several views are not kept."""
     first = case.observation
     poses = np.array(first.poses)
     covariance = np.array(first.covariance)
@@ -280,11 +280,11 @@ def assumed_observation(case: Case, states: States) -> Observation:
         assumed = replace(assumed, shared=(), tails=None)
     displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))
     if displaced:
-        assumed = _displaced(assumed, displaced)
+        assumed = _displace(assumed, displaced)
     return replace(assumed, poses=infer_poses(assumed, unknown).poses) if unknown else assumed
 
 
-def _displaced(observation: Observation, operations: tuple[int, ...]) -> Observation:
+def _displace(observation: Observation, operations: tuple[int, ...]) -> Observation:
     """With one displacement that some operations share, about their middle."""
     P = np.eye(4)
     P[:3, 3] = observation.poses[list(operations), :3, 3].mean(axis=0)
@@ -299,6 +299,6 @@ def soft_deviation(observation: Observation) -> Array:
     return np.hypot(fit_deviation(observation.assembly, observation.play_m), CONTRADICTION_M)
 
 
-def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
-    """Without other starts: what is not assumed is where contacts say already."""
+def _correct(observation: Observation, dropped: tuple[str, ...]) -> Correction:
+    """Without other starts: what is rejected is where contacts say already."""
     return as_begun.leaving_out(observation, dropped) if dropped else as_begun(observation)

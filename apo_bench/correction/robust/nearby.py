@@ -54,7 +54,7 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
     if C is None or not np.isfinite(without.badness):
         return [*rest[: _MOST_READINGS - 1], BROAD]
     told = without.states[k] and not all(map(says_nothing, without.states[k]))
-    known = _widened(C[k] + _FINE) if not told else C[k] + _FINE
+    known = _widen(C[k] + _FINE) if not told else C[k] + _FINE
     rated = list[tuple[float, int]]()
     for belief in (*rest, BROAD):
         unlikely = surprise((view,), (belief,), case.model)
@@ -68,7 +68,7 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
     return [belief for unlikely, belief in rated[:_MOST_READINGS] if unlikely < rated[0][0] + _UNLIKELY]
 
 
-def _widened(C: Array) -> Array:
+def _widen(C: Array) -> Array:
     """The covariance of an inferred pose if nothing but contacts tells of it: `UNKNOWN` is anywhere in the room."""
     W = np.linalg.inv(C) - np.linalg.inv(UNKNOWN) + np.linalg.inv(ROOM)
     w, V = np.linalg.eigh((W + W.T) / 2)

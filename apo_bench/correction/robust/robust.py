@@ -59,7 +59,7 @@ class RobustCorrector:
         """Correct an observation.
 
         Returns:
-            As `contact`; `left_out` are operations of which nothing that was observed is assumed, their poses are
+            As `contact`; `left_out` are operations whose observations are all rejected, their poses are
             inferred from contacts. `not_seen` if one was not observed of which no contact says anything.
 
         Raises:
@@ -73,13 +73,13 @@ class RobustCorrector:
         plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
         made: list[Correction | None] = [None] * len(observations)
         for i, correction in zip(plain, as_begun.together([observations[i] for i in plain]), strict=True):
-            made[i] = self._believed(observations[i], correction)
+            made[i] = self._accept(observations[i], correction)
         return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
 
     def correct_and_reobserve(self, observation: Observation, reobserve: Reobserver | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
         if reobserve is None and self._is_plain(observation):
-            correction = self._believed(observation, as_stated(observation))
+            correction = self._accept(observation, as_stated(observation))
             if correction is not None:
                 return correction
         model = self._model(observation)
@@ -109,7 +109,7 @@ class RobustCorrector:
         model = self._model(observation)
         return bool(observation.observed.all()) and model.surprises[INLIER] < model.surprises[GROSS]
 
-    def _believed(self, observation: Observation, correction: Correction) -> Correction | None:
+    def _accept(self, observation: Observation, correction: Correction) -> Correction | None:
         """A correction of all as it is stated, if that holds; noise that is larger makes regions larger."""
         test = correction.test
         if not correction.ok or test is None or test.p_value < self.level:
@@ -164,12 +164,12 @@ def _report(
     """The correction of what is assumed, with what was observed at first."""
     correction = best.correction
     if not best.doubts and not again:
-        return replace(correction, sentence=correction.sentence + _unexplained(best))
+        return replace(correction, sentence=correction.sentence + _describe_misfit(best))
     before = largest_gap(observation.assembly, observation.start, observation.poses)
     hypotheses = _hypotheses(search, best)
     return replace(
         correction,
-        sentence=correction.sentence + _unexplained(best) + _doubts(search, best) + _looks(again),
+        sentence=correction.sentence + _describe_misfit(best) + _doubts(search, best) + _looks(again),
         covariance=mode_covariance(hypotheses),
         noise_scale=best.scale,
         gap_before_m=before if observation.observed.all() else np.nan,
@@ -201,14 +201,14 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
             solved.stated,
             solved.left_out,
             solved.dropped,
-            _disbelieved(solved).removeprefix("; "),
+            _list_doubts(solved).removeprefix("; "),
             solved.scale,
         )
         for weight, solved in weighted
     )
 
 
-def _unexplained(best: SolvedHypothesis) -> str:
+def _describe_misfit(best: SolvedHypothesis) -> str:
     """What the test says that no outlier explains better."""
     if best.test is None or best.test.passes:
         return ""
@@ -217,8 +217,8 @@ def _unexplained(best: SolvedHypothesis) -> str:
 
 
 def _doubts(search: Search, best: SolvedHypothesis) -> str:
-    """What is not assumed, and how likely it is that a relation is wrong in place of an observation."""
-    words = _disbelieved(best)
+    """What is rejected, and how likely it is that a relation is wrong in place of an observation."""
+    words = _list_doubts(best)
     rival = search.rival(best)
     if rival is None:
         return words
@@ -229,7 +229,7 @@ def _doubts(search: Search, best: SolvedHypothesis) -> str:
     return f"{words}; an observation is to blame with {_share(1.0 - wrong)}, a relation ({named}) with {_share(wrong)}"
 
 
-def _disbelieved(best: SolvedHypothesis) -> str:
+def _list_doubts(best: SolvedHypothesis) -> str:
     """`; left out what was observed of operation 2; seen turned: operation 3`, or empty."""
     states = best.states
     stale = tuple(k for k in best.left_out if STALE in states[k])

@@ -81,25 +81,25 @@ class Search:
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
-            self._rescaled()
+            self._rescale()
             return min(self._known(), key=_badness)
         best = None
         if known is not None:
             best = self._try(continue_states(self._case.views, known.states, self._case.model), known.dropped)
-            self._refined(best)
+            self._refine(best)
             best = min(self._known(), key=_badness, default=None)
         if best is None or best.p_value < self._level or best.dropped:
             best = self._smallest(start)
         if best is not None:
-            self._refined(best)
+            self._refine(best)
             # Where a relation is to blame, the likeliest observation to blame in its place may have been turned.
             rival = self.rival(best) if best.dropped else None
             if rival is not None:
-                self._refined(rival)
-        self._rescaled()
+                self._refine(rival)
+        self._rescale()
         return min(self._known(), key=_badness, default=None)
 
-    def _rescaled(self) -> None:
+    def _rescale(self) -> None:
         """What if noise is larger than stated: all that was observed assumed, or what is likeliest."""
         for one in (self.first, min(self._known(), key=_badness, default=None)):
             if one is not None and (scale_noise := one.scale_noise()).scale > one.scale:
@@ -223,11 +223,11 @@ class Search:
         least = min((surprise for state, surprise in known.items() if state != now), default=known[now])
         return max(1, round((least - known[now]) / _BY))
 
-    def _believed(self, k: int) -> State:
+    def _trusted_state(self, k: int) -> State:
         """The likeliest state of an operation in which a view is assumed."""
         return next(state for _, state in self._beliefs[k] if INLIER in state)
 
-    def _refined(self, best: SolvedHypothesis) -> None:
+    def _refine(self, best: SolvedHypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
         most = self._looked_at() + _MOST_ALTOGETHER
         while self._looked_at() < most:
@@ -257,7 +257,7 @@ class Search:
         """A relation in place of an operation that is in doubt and that it depends on."""
         doubted = [k for k, state in enumerate(best.states) if any(map(is_false, state))]
         for k in () if best.dropped else doubted:
-            states = change_states(best.states, (k,), (self._believed(k),))
+            states = change_states(best.states, (k,), (self._trusted_state(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:

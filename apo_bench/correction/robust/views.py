@@ -1,4 +1,4 @@
-"""What was observed of each operation, once or several times, and what comes of it if some of that is not assumed.
+"""What was observed of each operation, once or several times, and what comes of it if some of that is rejected.
 
 Views of one operation that are assumed are merged into one Gaussian. That they agree is evidence that they are right,
 since false views lie anywhere, but for those that repeat the first.
@@ -41,7 +41,7 @@ class Merged(NamedTuple):
     """What the views of an operation say together if they are in some state."""
 
     goal: Array | None
-    """(4, 4); None if none of them is assumed."""
+    """(4, 4); None if all are rejected."""
     covariance: Array
     surprise: float
     """-2 log of how likely such states and views are, relative to one inlier, without contacts."""

@@ -1,12 +1,12 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearised_by
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestPoses, nearest_poses, solve_batch
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,
     bound_contacts,
-    demanded,
+    demands_of,
     nearest_between,
     violations,
 )
@@ -55,13 +55,13 @@ __all__ = (
     "compact_equations",
     "coordinates_of",
     "correction_to",
-    "demanded",
+    "demands_of",
     "descend_to_nearest",
     "fit_covariance",
     "freedom_of",
     "jacobian_rank",
     "least_step",
-    "linearised_by",
+    "linearise_by",
     "marginals",
     "nearest_between",
     "nearest_poses",

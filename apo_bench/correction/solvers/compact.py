@@ -131,7 +131,7 @@ def compact_equations(system: Equations, n: int) -> CompactEquations:
     return CompactEquations(words, words.constants(system.start), plane, points)
 
 
-def linearised_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, Array]:
+def linearise_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, Array]:
     """e, (*, 3 c), [m], at the poses T, (*, n, 4, 4), and its derivative by z, transposed, (*, 6 n, 3 c).
 
     Args:

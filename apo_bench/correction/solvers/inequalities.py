@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Equations, project_round_faces
-from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestPoses, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import poses_at, shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
@@ -75,7 +75,9 @@ def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequa
     return gaps
 
 
-def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
+def demands_of(
+    system: Equations, assembly: Assembly, play_m: float
+) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
     low, high = project_round_faces(assembly).intervals(play_m).T
     exact = low == high
@@ -125,11 +127,11 @@ def nearest_between(
     Jt = start.Jt
     last = np.zeros(len(start.z))
     for _ in range(_ITERATIONS):
-        e, Jt = linearised_by(system, T, B)
+        e, Jt = linearise_by(system, T, B)
         # Equations first: the shortest z on them, and what they leave free there, of the rank that is known already.
-        nearest = _settled(e, Jt, z)
+        nearest = _shortest(e, Jt, z)
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
-        e_wall, J_wall = inequalities.system.linearised(T)
+        e_wall, J_wall = inequalities.system.linearise(T)
         J_wall = pull_back(J_wall.reshape(len(inequalities), -1), B)
         # Where walls will be at that z; the program moves on in the free directions alone, z = nearest + free u.
         ahead = e_wall + J_wall @ (nearest - z)
@@ -140,7 +142,7 @@ def nearest_between(
         over = settles(largest, before)
         rest = over and room
         # All of the step where it is the last, so that equations hold to rounding.
-        pace = _paced(pace, step, last)
+        pace = _choose_pace(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
         (T,), (B,) = poses_at(observed, L[None], z[None])
@@ -150,7 +152,7 @@ def nearest_between(
     return NearestPoses(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), system.forms(T), trace)
 
 
-def _settled(e: Array, Jt: Array, z: Array) -> Array:
+def _shortest(e: Array, Jt: Array, z: Array) -> Array:
     """The shortest z that satisfies the linearised equations, (6 n,), damped as if they held."""
     if not len(e):
         return np.zeros(len(z))
@@ -166,13 +168,13 @@ def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) ->
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
     """
-    e, J = inequalities.system.linearised(nearest.poses)
+    e, J = inequalities.system.linearise(nearest.poses)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
     J = pull_back(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 
 
-def _paced(pace: float, step: Array, last: Array) -> float:
+def _choose_pace(pace: float, step: Array, last: Array) -> float:
     """The part of a step to make: all of it, but less where inequalities in turn make steps go to and fro.
 
     If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).

@@ -3,7 +3,8 @@
 Nothing is decided here: `gauss_newton` decides how much to damp and when to stop, for both twins. This is plain Python
 and imports nothing from the package: Numba (Lam, Pitrou and Seibert, 2015) compiles it at the first correction and
 keeps the result while this file stays as it is. Few indices, few statements and no views keep the compilation short.
-Arrays are C-contiguous; b observations of one assembly with c contacts, n operations and p parts.
+Arrays are C-contiguous; b observations of one assembly with c contacts, n operations and p parts. What is one matrix
+product elsewhere is three loops here.
 """
 
 import math
@@ -75,13 +76,13 @@ def linearise(
 
     Args:
         words: (3, c, w): letters, columns and inverse (0 or 1) of `Words`.
-        matrices: (2, p + n + 1, 4, 4): `Words.constants`, poses and their inverses; those of the poses are overwritten.
+        matrices: (2, p + n + 1, 4, 4): `Words.constants`, with inverses; those of operations are overwritten.
         points: (b, c, 3, 4); observed (b, n, 4, 4); L (b, n, 6, 6); z (b, 6 n).
         soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
         rows: Which observations.
         series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
-        small: (6, 6, 6), scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one pose.
-        behind: (w + 1, 3, 4), scratch: what stands behind each letter of one contact times its points; so is before,
+        small: (6, 6, 6), zeros, then scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one pose.
+        behind: (w + 1, 3, 4), scratch, what stands behind each letter of one contact times its points; so is before,
             (w + 1, 4), its plane times what stands before.
         T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), forms (b, c, 4),
             n D_a^-1 D_b, and sizes (3, b) as `LinearStep` has them.
@@ -92,41 +93,50 @@ def linearise(
     first = matrices.shape[1] - 1 - n
     for o in rows:
         for k in range(n):
-            # xi = L z, its squared angle, and the coefficients a, b, c, d of ad, .., ad^4 in J_r.
+            # xi = L z, its squared angle, and the coefficients of ad, .., ad^4 in J_r.
             square = 0.0
             for i in range(6):
                 t = 0.0
                 for j in range(6):
                     t += L[o, k, i, j] * z[o, 6 * k + j]
                 small[0, 0, i] = t
-                square += t * t if i > 2 else 0.0
+                if i > 2:
+                    square += t * t
             for j in range(4):
                 t = 0.0
                 for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
                     t = t * square + series[i, 2 + j]
                 small[0, 1, j] = t
-            # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2, and B = J_r L.
-            for i in range(6):
+            # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2: the upper three rows.
+            # Of a, b; 0, a the lower three are copies, and their zeros stay.
+            for i in range(3):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
                         t += small[0, 0, q] * adjoints[q, i, j]
                     small[1, i, j] = t
-            for i in range(6):
+                    if j < 3:
+                        small[1, 3 + i, 3 + j] = t
+            for i in range(3):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
                         t += small[1, i, q] * small[1, q, j]
                     small[2, i, j] = t
+                    if j < 3:
+                        small[2, 3 + i, 3 + j] = t
                     small[3, i, j] = small[0, 1, 2] * small[1, i, j] + small[0, 1, 3] * t
                 small[3, i, i] += small[0, 1, 1]
-            for i in range(6):
+            for i in range(3):
                 for j in range(6):
                     t = small[0, 1, 0] * small[1, i, j]
                     for q in range(6):
                         t += small[3, i, q] * small[2, q, j]
                     small[4, i, j] = t
                 small[4, i, i] += 1.0
+                for j in range(3):
+                    small[4, 3 + i, 3 + j] = small[4, i, j]
+            for i in range(6):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
@@ -215,40 +225,96 @@ def linearise(
 
 
 def change(
-    J: _Array, e: _Array, z: _Array, mu: _Array, soft2: _Array, rows: _Index, R: _Array, y: _Array, step: _Array
+    J: _Array,
+    e: _Array,
+    z: _Array,
+    L: _Array,
+    mu: _Array,
+    soft2: _Array,
+    rows: _Index,
+    R: _Array,
+    y: _Array,
+    step: _Array,
+    largest: _Array,
+    angles: _Array,
 ) -> None:
     """J^t (J J^t + mu + soft2)^-1 (J z - e) - z of some observations, by R R^t = J J^t + mu + soft2 (Cholesky).
 
     Args:
-        J: (b, m, 6 n); e is (b, m) and z (b, 6 n).
+        J: (b, m, 6 n); e is (b, m), z (b, 6 n), L (b, n, 6, 6).
         mu: (rows,), above zero; soft2 is (m,).
         rows: Which observations.
         R: (m, m), scratch, one over each pivot's root on the diagonal, nothing above it; so is y (m,).
         step: (rows, 6 n), overwritten.
+        largest: (rows,), overwritten: its largest component.
+        angles: (rows,), overwritten: how far a pose is rotated at most, [rad].
     """
     m = e.shape[1]
     size = z.shape[1]
     for x in range(len(rows)):
         o = rows[x]
-        # Row by row: J z - e, J J^t, its factor, and the first substitution.
         for i in range(m):
             y[i] = -e[o, i]
             for q in range(size):
                 y[i] += J[o, i, q] * z[o, q]
+        # Contact by contact: J J^t, its factor, and the first substitution. Three rows by three at once, since what is
+        # read is used three times then; indices are those of contacts, by which the compiler knows that none is below
+        # zero.
+        for i in range(m // 3):
             for j in range(i + 1):
-                t = 0.0
+                r = 3 * i
+                s = 3 * j
+                t00 = 0.0
+                t01 = 0.0
+                t02 = 0.0
+                t10 = 0.0
+                t11 = 0.0
+                t12 = 0.0
+                t20 = 0.0
+                t21 = 0.0
+                t22 = 0.0
                 for q in range(size):
-                    t += J[o, i, q] * J[o, j, q]
-                for q in range(j):
-                    t -= R[i, q] * R[j, q]
-                if j < i:
-                    t *= R[j, j]
-                    y[i] -= t * y[j]
-                else:
-                    # By rounding alone a pivot would be less than what is added.
-                    t = 1.0 / math.sqrt(max(t, 0.0) + mu[x] + soft2[i])
-                    y[i] *= t
-                R[i, j] = t
+                    t00 += J[o, r, q] * J[o, s, q]
+                    t01 += J[o, r, q] * J[o, s + 1, q]
+                    t02 += J[o, r, q] * J[o, s + 2, q]
+                    t10 += J[o, r + 1, q] * J[o, s, q]
+                    t11 += J[o, r + 1, q] * J[o, s + 1, q]
+                    t12 += J[o, r + 1, q] * J[o, s + 2, q]
+                    t20 += J[o, r + 2, q] * J[o, s, q]
+                    t21 += J[o, r + 2, q] * J[o, s + 1, q]
+                    t22 += J[o, r + 2, q] * J[o, s + 2, q]
+                for q in range(s):
+                    t00 -= R[r, q] * R[s, q]
+                    t01 -= R[r, q] * R[s + 1, q]
+                    t02 -= R[r, q] * R[s + 2, q]
+                    t10 -= R[r + 1, q] * R[s, q]
+                    t11 -= R[r + 1, q] * R[s + 1, q]
+                    t12 -= R[r + 1, q] * R[s + 2, q]
+                    t20 -= R[r + 2, q] * R[s, q]
+                    t21 -= R[r + 2, q] * R[s + 1, q]
+                    t22 -= R[r + 2, q] * R[s + 2, q]
+                R[r, s] = t00
+                R[r, s + 1] = t01
+                R[r, s + 2] = t02
+                R[r + 1, s] = t10
+                R[r + 1, s + 1] = t11
+                R[r + 1, s + 2] = t12
+                R[r + 2, s] = t20
+                R[r + 2, s + 1] = t21
+                R[r + 2, s + 2] = t22
+                for u in range(3):
+                    for v in range(3):
+                        t = R[r + u, s + v]
+                        for q in range(v):
+                            t -= R[r + u, s + q] * R[s + v, s + q]
+                        if s + v < r + u:
+                            t *= R[s + v, s + v]
+                            y[r + u] -= t * y[s + v]
+                        elif s + v == r + u:
+                            # By rounding alone a pivot would be less than what is added.
+                            t = 1.0 / math.sqrt(max(t, 0.0) + mu[x] + soft2[r + u])
+                            y[r + u] *= t
+                        R[r + u, s + v] = t
         # The second substitution, and J^t y - z.
         for q in range(size):
             step[x, q] = -z[o, q]
@@ -258,6 +324,17 @@ def change(
                 y[q] -= R[i, q] * y[i]
             for q in range(size):
                 step[x, q] += y[i] * J[o, i, q]
+        largest[x] = 0.0
+        angles[x] = 0.0
+        for k in range(size // 6):
+            square = 0.0
+            for i in range(6):
+                largest[x] = max(largest[x], abs(step[x, 6 * k + i]))
+                t = 0.0
+                for q in range(6):
+                    t += L[o, k, i, q] * step[x, 6 * k + q]
+                square += t * t if i > 2 else 0.0
+            angles[x] = max(angles[x], math.sqrt(square))
 
 
 PLAIN = Kernels(linearise, change)

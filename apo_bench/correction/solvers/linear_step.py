@@ -9,7 +9,7 @@ from typing import Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.kernels import Kernels, own
 from apo_bench.geometry import ADJOINTS, SERIES, Array, exp_and_jacobian
 
@@ -84,7 +84,7 @@ class DenseStep:
             points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
             self._contacts = system.words.table, np.array(system.constants), own(system.plane), own(points)
             width = system.words.letters.shape[1]
-            self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
+            self._scratch = np.zeros((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
             self._factor = np.empty((m, m)), np.empty(m)
             self._forms = np.empty((b, len(system), 4))
 
@@ -105,7 +105,7 @@ class DenseStep:
             return
         some = self._views(rows)
         self.T[some], self.B[some] = poses_at(self._observed[some], self._L[some], z[some])
-        e, Jt = linearised_by(self._system.only(some), self.T[some], self.B[some])
+        e, Jt = linearise_by(self._system.only(some), self.T[some], self.B[some])
         m = max(self.e.shape[1], 1)
         self.e[some] = e
         self._J[some] = np.swapaxes(Jt, 1, 2)
@@ -114,12 +114,16 @@ class DenseStep:
         self.sizes[2, some] = np.einsum("bij,bij->b", Jt, Jt) / m
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
-        some = self._views(rows)
+        # The kernel does what the lines below it do, by a Cholesky decomposition.
         if self._kernels is not None:
             step = np.empty((len(rows), z.shape[1]))
-            self._kernels.change(self._J, self.e, z, mu, self._soft2, rows, *self._factor, step)
-        else:
-            step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
+            largest = np.empty(len(rows))
+            angles = np.empty(len(rows))
+            known = self._J, self.e, z, self._L, mu, self._soft2
+            self._kernels.change(*known, rows, *self._factor, step, largest, angles)
+            return step, largest, angles
+        some = self._views(rows)
+        step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
         return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
 
     def _views(self, rows: Rows) -> Any:

@@ -81,7 +81,7 @@ def _descend(
     units = np.array([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
     for iteration in range(_ITERATIONS + 1):
-        e, J = equations.linearised(now)
+        e, J = equations.linearise(now)
         try:
             step, rank = least_step(J[:, columns] / units, e, cut_off, at_most)
         except np.linalg.LinAlgError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
 from apo_bench.correction.solvers.linear_step import poses_at
 from apo_bench.correction.solvers.whitened import correction_to
@@ -33,7 +33,7 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
     """
     z = correction_to(observed, L, poses)
     for _ in range(_ITERATIONS):
-        (e,), (Jt,) = _linearised(system, observed, L, z[None])
+        (e,), (Jt,) = _linearise(system, observed, L, z[None])
         # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
         U, w, Vt = np.linalg.svd(Jt)
         rank = int(np.count_nonzero(w > _RANK * w[0]))
@@ -44,7 +44,7 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
         multipliers = -Vt.T @ (U.T @ z / w)
         towards = -U @ (Vt @ e / w)
         # The Lagrangian's second derivative along N, 1 + sum l_i f_i'': f'' N as a difference of two derivatives.
-        _, beside = _linearised(system, observed, L, z + _APART * N.T)
+        _, beside = _linearise(system, observed, L, z + _APART * N.T)
         bent = N + ((beside - Jt) @ multipliers).T / _APART
         # Newton's step along N, downhill whatever the sign of a curvature.
         curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)
@@ -56,6 +56,6 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
     return poses_at(observed, L[None], z[None])[0][0]
 
 
-def _linearised(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+def _linearise(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
     """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
-    return linearised_by(system, *poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))
+    return linearise_by(system, *poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

@@ -88,7 +88,7 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
             own[_Shift(inner.part, outer.part, made, made)] = -loose[contact] * assembly.face(inner).normal
         for face in contact:
             n = assembly.face(face).normal
-            for shift, way in _carried(assembly, face.part, made, loose):
+            for shift, way in _carried_shifts(assembly, face.part, made, loose):
                 own[shift] = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift, loose) @ n)
         shifts.append(own)
     return tuple(shifts), unit_m
@@ -105,7 +105,7 @@ def _looseness(assembly: Assembly, contact: Contact, play_m: float, unit_m: floa
     return size * _DISC if contact in assembly.origin and not assembly.face(contact.manipulated).opposes else size
 
 
-def _carried(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[tuple[_Shift, float]]:
+def _carried_shifts(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[tuple[_Shift, float]]:
     """The displacements within carriers by which a part is off after an operation: as it lay at first, and then."""
     carried = list[tuple[_Shift, float]]()
     for k in range(after, -1, -1):

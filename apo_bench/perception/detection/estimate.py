@@ -72,7 +72,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimat
     xi = pose.log(back @ poses)
     for _ in range(_TURNS):
         # Poses are seen.poses exp(xi); equations are linear in body twists at the poses, which are Jr d(xi).
-        e, J = system.linearised(poses)
+        e, J = system.linearise(poses)
         Jr = right_jacobian(xi)
         J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
         CJ = C @ J.T

@@ -72,7 +72,7 @@ class Arrival:
 
     def own(self, direction: Array) -> Array:
         """A direction, (3,), in the frame of the part."""
-        return _own(direction, self.T)
+        return _to_part_frame(direction, self.T)
 
     @property
     def axes(self) -> tuple[Array, Array, Array]:
@@ -113,7 +113,7 @@ def arrive(
         return is_way_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
-        begin = [Posed(posed.pieces, _shifted(posed.T, length_m * way)) for posed in moving]
+        begin = [Posed(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
         return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
@@ -139,7 +139,7 @@ def arrive(
 
     macros = chain(normals, out, float(np.sin(angle_rad)))
     if macros.way is not None:
-        line = Attach(_own(-macros.way.direction, T), reach(macros.way.length_m))
+        line = Attach(_to_part_frame(-macros.way.direction, T), reach(macros.way.length_m))
         is_free = macros.way.free
     else:
         there = list(_admissible(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
@@ -150,7 +150,7 @@ def arrive(
         found_free = next((each for each in chained(tried, longer) if clear(*each)), None)
         way, length_m = found_free or tried[0]
         is_free = found_free is not None
-        line = Attach(_own(-way, T), length_m)
+        line = Attach(_to_part_frame(-way, T), length_m)
     if direction is not None:
         line = Attach(direction, line.travel_m)
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > _LIFTED)
@@ -217,14 +217,14 @@ def _normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) ->
     return snap_normals(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
 
 
-def _own(direction: Array, T: Array) -> Array:
+def _to_part_frame(direction: Array, T: Array) -> Array:
     """A direction in the frame of the part; exact where it is vertical."""
     if np.linalg.norm(direction + UP) < _SAME:
         return np.asarray(T[:3, :3].T @ -UP)
     return np.asarray(np.round(T[:3, :3].T @ direction, 12) + 0.0)
 
 
-def _shifted(T: Array, by: Array) -> Array:
+def _shift(T: Array, by: Array) -> Array:
     out = np.array(T)
     out[:3, 3] += by
     return out

@@ -86,7 +86,7 @@ def classify(rows: Array) -> Cone:
         return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), ContactState(n, 0, 0))
     # Equal rows open together, so the programme is solved for one of each.
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
-    opens, x = _opened(different.tobytes(), *different.shape)
+    opens, x = _open_rows(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
     maintaining = n - row_rank(rows)
     constraining = row_rank(rows[~detachable])
@@ -94,7 +94,7 @@ def classify(rows: Array) -> Cone:
 
 
 @lru_cache(maxsize=1024)
-def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
+def _open_rows(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
     """The programme for rows (k, n): which are opened, (k,), by what unit motion, (n,)."""
     from scipy.optimize import linprog
 

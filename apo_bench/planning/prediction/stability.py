@@ -70,7 +70,7 @@ def imbalance(
     if not ups or not (ceilings or min(ups) < 0.0):
         return 0.0
     carrying = signs > (-np.inf if ceilings else 0.0)
-    return max(_unbalanced(points[carrying], signs[carrying], centroid + off) for off in offs)
+    return max(_solve_balance(points[carrying], signs[carrying], centroid + off) for off in offs)
 
 
 def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
@@ -117,7 +117,7 @@ def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
     return np.asarray(volumes @ np.array(centroids) / volumes.sum())
 
 
-def _unbalanced(points: Array, signs: Array, centroid: Array) -> float:
+def _solve_balance(points: Array, signs: Array, centroid: Array) -> float:
     """What forces >= 0 at the points leave of a unit weight at the centroid: three equations, least squares."""
     from scipy.optimize import nnls
 

@@ -17,39 +17,39 @@ Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
 
-def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
+def replay_command(record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
     """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
-    return f"{without_seed(row, files, limits)} --seed {row['seed']}"
+    return f"{without_seed(record, files, limits)} --seed {record['seed']}"
 
 
-def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
+def without_seed(record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
     """A replay command without its seed: what the trials of a cell have in common."""
-    scenario = str((files or {}).get(row["scenario"], row["scenario"]))
+    scenario = str((files or {}).get(record["scenario"], record["scenario"]))
     scenario = f"./{scenario}" if scenario.startswith("-") else scenario
-    return shlex.join(["apo-bench", "run", scenario, *_options(row, limits)])
+    return shlex.join(["apo-bench", "run", scenario, *_options(record, limits)])
 
 
-def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
+def _options(record: Mapping[str, Any], limits: Limits) -> list[str]:
     words: list[str] = []
 
     def add(option: str, value: object, default: object = None) -> None:
         if value != default:
             words.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
 
-    measured = row["pose_source"] == DEPTH_CAMERA
-    if measured or row["noise_mm"] == row["noise_deg"]:
-        add(NOISE_LEVEL.option, float(row["noise_mm"]), SETTINGS["noise_mm"].default)
+    measured = record["pose_source"] == DEPTH_CAMERA
+    if measured or record["noise_mm"] == record["noise_deg"]:
+        add(NOISE_LEVEL.option, float(record["noise_mm"]), SETTINGS["noise_mm"].default)
     else:
         for name in ("noise_mm", "noise_deg"):
             info = SETTINGS[name]
-            add(info.option, float(row[info.name]), info.default)
+            add(info.option, float(record[info.name]), info.default)
     for name, info in SETTINGS.items():
-        value = row.get(info.name, info.default)
+        value = record.get(info.name, info.default)
         if name in _APART or (name == "noise" and measured) or (value == info.default and name not in _ALWAYS):
             continue
         add(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
-    add(SETTINGS["secret_seed"].option, _SALT_FILE if row.get("secret_seed") else None)
-    if row.get("failure_stage") == "worker":
+    add(SETTINGS["secret_seed"].option, _SALT_FILE if record.get("secret_seed") else None)
+    if record.get("failure_stage") == "worker":
         add("trial-limit", limits.trial_s)
     return words
 

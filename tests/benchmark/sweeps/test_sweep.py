@@ -259,7 +259,7 @@ def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str
     rows[4]["config_hash"] = "0" * 16
     (tmp_path / "trials.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     with pytest.raises(
-        InputError, match=r"holds a row of stick_in_tower, method \w+, seed 1\d, that was made with other"
+        InputError, match=r"holds a record of stick_in_tower, method \w+, seed 1\d, that was made with other"
     ):
         runner.run_sweep(SPEC, tmp_path)
 

@@ -123,7 +123,7 @@ def drift(scene: scenes.Scene, seen: Array) -> float:
     found = solve_newton(system, seen, range(n))
     assert found.gap_m < NOTHING_M
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], n)
-    _, w, Vt = np.linalg.svd(system.linearised(found.poses)[1] / unit)
+    _, w, Vt = np.linalg.svd(system.linearise(found.poses)[1] / unit)
     free = Vt[np.count_nonzero(w > 1e-7 * w[0]) :]
     return float(np.linalg.norm(free @ (pose.log(pose.inverse(seen) @ found.poses).ravel() * unit))) / 2e-3
 

@@ -32,7 +32,7 @@ def dense(system: CompactEquations, T: Array) -> tuple[Array, Array]:
 
 def check_same(scene: scenes.Scene, moved: Array) -> None:
     system, small = both(scene)
-    e, J = system.linearised(moved)
+    e, J = system.linearise(moved)
     e3, J3 = dense(small, moved)
     assert len(small) == len(system.letters)
     assert_allclose(e3 @ e3, e @ e, rtol=1e-11, atol=1e-20)

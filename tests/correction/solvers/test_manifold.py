@@ -119,11 +119,11 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(4)
     n = len(scene.goals)
-    for demanded in (0.0, 0.5):
+    for demands_of in (0.0, 0.5):
         L = crooked(n, rng)
         seen = twisted(scene.goals, L, rng)
         system = system_of(scene, seen)
-        hard = np.repeat(rng.random(len(system)) < demanded, 3)
+        hard = np.repeat(rng.random(len(system)) < demands_of, 3)
         soft_m = np.where(hard, 0.0, rng.uniform(0.1e-3, 2e-3, len(hard)))
         found = nearest_poses(system, seen, L, soft_m)
         assert found.at_rest

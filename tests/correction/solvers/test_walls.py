@@ -60,7 +60,7 @@ def unbalanced(seen: Observation, goals: Array) -> float:
     system = contact_equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
-    e, J = system.linearised(goals)
+    e, J = system.linearise(goals)
     J = (J.reshape(len(e), -1, 1, 6) @ B).reshape(len(e), -1)
     exact = low == high
     at_low = e < low + 1e-9

@@ -95,4 +95,4 @@ def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -
     assert text.startswith(f"# camera: {about.title}\n")
     for line in (*about.formula, *about.parameters, about.frame, about.states, *about.notes):
         assert line in text
-    assert "\nErrors at 2 mm and 2 deg, 3000 operations of stick_in_tower:\n" in text
+    assert "\nErrors at noise mm 2 and noise deg 2, 3000 operations of stick_in_tower:\n" in text

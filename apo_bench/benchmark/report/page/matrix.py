@@ -1,4 +1,4 @@
-"""The cells of a page: a matrix of methods over levels for every setting, and the trials of every cell for the script.
+"""The matrix of a page, methods over noise levels, and the trials behind each of its cells.
 
 A cell is a button that opens its trials.
 """

@@ -1,4 +1,4 @@
-"""Tables of success: rates of cells, pairs of methods over the same seeds, levels of half success."""
+"""Tables of success: rates of conditions, pairs of methods over the same seeds, levels of half success."""
 
 from collections.abc import Sequence
 
