@@ -103,7 +103,7 @@ def test_what_makes_no_sense_is_refused_in_one_sentence(old: str, new: str, word
         assert word in message
 
 
-def test_a_contact_that_is_made_twice_is_asked_for_once(tmp_path: Path) -> None:
+def test_a_contact_that_is_made_twice_has_one_kind(tmp_path: Path) -> None:
     """Example 5.3: the cube stands on the table before and after castle 2 is pushed against it."""
     text = (folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8")
     pair = '["nz", "table.top"]'
@@ -114,8 +114,8 @@ def test_a_contact_that_is_made_twice_is_asked_for_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as error:
         load_scenario(path)
     assert (
-        "operation 4, contacts: 'cube.nz on table.top' is asked to be centred here and clearance from -1 to 1 mm in "
-        "operation 2; ask for the same in both."
+        "operation 4, contacts: 'cube.nz on table.top' is to be centred here and clearance from -1 to 1 mm in "
+        "operation 2; state the same in both."
     ) in str(error.value)
     path.write_text(text.replace(pair, loose), encoding="utf-8")
     assert list(load_scenario(path).assembly.gaps.values()) == [Gap("clearance", -1e-3, 1e-3)]
