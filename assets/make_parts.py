@@ -1,7 +1,6 @@
-"""Makes the parts with round and tilted faces that come with the package: `python assets/make_parts.py [FOLDER]`.
+"""Write the package's parts with round and tilted faces: `python assets/make_parts.py [FOLDER]`.
 
-Lengths in mm. Holes and slots are marked fit, shafts and what slides in them never are: a hole is made wider by the
-clearance, and its shaft as it is drawn.
+Lengths in mm. Holes and slots are marked fit and become wider by the clearance; shafts and keys never are.
 """
 
 from __future__ import annotations

@@ -72,15 +72,15 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "scene": "Scene",
         "where": "Scene",
         "grids": "SweepConfig",
-        "settings": "TrialConfig",
+        "run_trial.config": "TrialConfig",
     }
     others = {
         "simulated": simulated,
         "observations": [observation],
         "reached": reached,
         "reference": reference,
-        "goals": reference,
         "poses": shown.final,
+        "explain.poses": reference,
         "rng": np.random.default_rng(0),
         "human_error": 1.0,
         "env": gymnasium.make("APOReplay-v0", scenario=SCENARIO),
@@ -91,6 +91,7 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "height": 24,
         "most_s": 0.0,
         "out": made / "rows",
+        "save_scenario.folder": made / "saved",
         "read_observation.path": made / "seen.csv",
         "read_arm.path": folder("assets") / "arms" / "six_axis.toml",
     }
@@ -154,9 +155,10 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
         with pytest.raises(apo_bench.InputError, match="observed of Observation must be an array of True"):
             dataclasses.replace(observation, observed=seen)
     start = {**observation.start, "stik": np.eye(4)}
-    shown = {"human_error_scale": observation.covariance, "final": {}}
+    shown = {"human_error_covariance": observation.covariance, "final": {}}
     parts = {"assembly": observation.assembly, "poses": observation.poses}
-    for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, parts)):
+    plan = {"assembly": observation.assembly, "target_poses": observation.poses}
+    for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, plan)):
         with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'; did you mean 'stick'"):
             record(**{**more, "start": start})
     for key in ("start", "final"):
