@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import trimesh
 
 import apo_bench
 from apo_bench.assembly import Outcome, Reached, Snapshot
@@ -40,6 +41,10 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
     made = tmp_path_factory.mktemp("valid")
     rows = [f"{k},{each.main},0,0,30,1,0,0,0" for k, each in enumerate(assembly.operations, start=1)]
     (made / "seen.csv").write_text("\n".join(["operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows]), encoding="utf-8")
+    blocks = [
+        trimesh.creation.box((30, 30, 20), trimesh.transformations.translation_matrix((0, 0, z))) for z in (10, 30)
+    ]
+    trimesh.util.concatenate(blocks).export(made / "blocks.stl")
     records = {
         "Arm": castles.arm,
         "Assembly": assembly,
@@ -91,6 +96,12 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "height": 24,
         "most_s": 0.0,
         "out": made / "rows",
+        "import_part.file": made / "blocks.stl",
+        "import_part.folder": made / "parts",
+        "import_part.unit": "mm",
+        "import_assembly.files": made / "blocks.stl",
+        "import_assembly.unit": "mm",
+        "import_assembly.out": made / "blocks.toml",
         "save_scenario.folder": made / "saved",
         "read_observation.path": made / "seen.csv",
         "read_arm.path": folder("assets") / "arms" / "six_axis.toml",

@@ -7,7 +7,7 @@ from itertools import product
 from numbers import Integral, Real
 from typing import Any, final
 
-from apo_bench.errors import require
+from apo_bench.errors import require, shown
 from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
     DEPTH_CAMERA,
@@ -99,7 +99,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
             check(name, getattr(self, name))
         require(
             isinstance(self.trials, Integral) and 1 <= self.trials <= MOST_TRIALS,
-            f"trials must be a whole number from 1 to {MOST_TRIALS}, got {self.trials}.",
+            f"trials must be a whole number from 1 to {MOST_TRIALS}, got {shown(self.trials)}.",
         )
         object.__setattr__(self, "trials", int(self.trials))
         check("seed", self.seed)

@@ -1,4 +1,4 @@
-"""What robots probing_results about themselves: summaries beside what was drawn and told, and what cells and tables say of it."""
+"""Estimates of robots that probe, against drawn and assumed errors, in lines, conditions and tables."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
     low, high = wilson(19, 20)
     least, most = tango(11, 0, 20)
     assert said(rows) == (
-        f"`contact` succeeds in 19 of 20 trials (95.0 %; 95 % interval {100 * low:.1f} to {100 * high:.1f} %). `uncorrected` "
-        "succeeds in 8 of the same 20: `contact` succeeds more often, by 55.0 points (95 % interval "
+        f"`contact` succeeds in 19 of 20 trials (95.0 %; 95 % interval {100 * low:.1f} to {100 * high:.1f} %). "
+        "`uncorrected` succeeds in 8 of the same 20: `contact` succeeds more often, by 55.0 points (95 % interval "
         f"{100 * least:+.1f} to {100 * most:+.1f})."
     )
 

@@ -279,7 +279,8 @@ def test_a_file_and_flags_make_the_same_rows(tmp_path: Path, capsys: pytest.Capt
     from apo_bench.cli.app import main
 
     (tmp_path / "grid.toml").write_text(
-        'scenario = ["block_on_block"]\nnoise_level = [40, 0]\nhuman_error_scale = [0]\nmethod = ["snap"]\ntrials = 9\nseed = 2\n'
+        'scenario = ["block_on_block"]\nnoise_level = [40, 0]\nhuman_error_scale = [0]\nmethod = ["snap"]\n'
+        "trials = 9\nseed = 2\n"
     )
     flags = ["block_on_block", "--noise-level", "40,0", "--human-error-scale", "0", "--method", "snap", "--seed", "2"]
     written = []
