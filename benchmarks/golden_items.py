@@ -54,7 +54,7 @@ DROPPED = {
     ),
     *("pose_source", "noise", "grasp", "arm", "robot_error", "contact_source", "method", "max_reobservations"),
     *("ft_sensor", "assumed_robot_error", "min_predicted_success", "seed", "secret_seed", "timestep_s", "fidelity"),
-    *("human_covariance", "level", "sentence", "joint_control", "why", "trace", "assembly", "assumed", "believed"),
+    *("human_error_covariance", "level", "sentence", "joint_control", "why", "trace", "assembly", "assumed", "believed"),
 }
 """Not kept of what the package returns, by neutral names: settings, texts, provenance, iterations of solvers."""
 
@@ -192,4 +192,4 @@ def neutral(name: str) -> str:
     return _NEUTRAL.get(name, name)
 
 
-_NEUTRAL = {now: name for name, now in (KEYS | SETTINGS).items()}
+_NEUTRAL = {now: name for name, now in (KEYS | SETTINGS).items() if name != "human_covariance"}

@@ -1,7 +1,7 @@
 """Conditions: what trials share that differ in nothing but the seed."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, make_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,9 +9,8 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.records import (
     DEPTH_CAMERA,
-    NO_ROBOT_ERROR,
+    SETTINGS,
     USUAL,
-    TrialConfig,
     affects,
     knows_truth,
     parse_method,
@@ -22,8 +21,23 @@ _FIRST = ("oracle", "uncorrected", "spiral-search", "nominal", "contact", "paper
 """Methods in the order of tables: the ceiling, plans without a correction, `contact`, the paper's two methods."""
 
 
+_OWN = ("scenario", "clearance_mm", "noise", "contact_source", "human_error_scale", "noise_mm", "noise_deg", "method")
+_OTHERS = tuple(
+    name for name, info in SETTINGS.items() if name not in (*_OWN, "seed") and (info.key or name == "fidelity")
+)
+
+
+def _other_fields() -> Iterator[tuple[str, Any, Any]]:
+    for name in _OTHERS:
+        yield name, Any, field(default=SETTINGS[name].default, kw_only=True)
+
+
+_Others: Any = make_dataclass("_Others", _other_fields(), frozen=True)
+"""One field for each further setting that distinguishes trials."""
+
+
 @dataclass(frozen=True)
-class Condition:
+class Condition(_Others):  # type: ignore[misc]  # made from the settings, so that a new one is in tables as well
     """All settings of a trial that a sweep may vary, except the seed.
 
     A curve over noise levels has the noise 0, and a setting, which a table or panel shows, also the method ``.
@@ -37,18 +51,11 @@ class Condition:
     noise_mm: float
     noise_deg: float
     method: str
-    grasp: str = TrialConfig.grasp
-    fidelity: str = TrialConfig.fidelity
-    max_reobservations: int = TrialConfig.max_reobservations
-    robot_error: str = TrialConfig.robot_error
-    ft_sensor: str = TrialConfig.ft_sensor
-    assumed_robot_error: str = TrialConfig.assumed_robot_error
-    min_predicted_success: float = TrialConfig.min_predicted_success
 
     @property
     def condition(self) -> "Condition":
         """The condition alone, of something that has one."""
-        return Condition(*(getattr(self, name) for name in CONDITION_FIELDS))
+        return Condition(**{name: getattr(self, name) for name in CONDITION_FIELDS})
 
     @property
     def curve(self) -> "Condition":
@@ -59,6 +66,11 @@ class Condition:
     def setting(self) -> "Condition":
         """The same at every noise level, of every method."""
         return replace(self.curve, method="")
+
+    def with_default(self, name: str) -> "Condition":
+        """The same with the default of a setting."""
+        changes: dict[str, Any] = {name: SETTINGS[name].default}
+        return replace(self.condition, **changes)
 
     @property
     def noise_words(self) -> str:
@@ -83,20 +95,15 @@ class Condition:
             f"{self.clearance_mm:g} mm clearance": True,
             "depth camera" if self.noise == DEPTH_CAMERA else f"{self.noise} noise": self.noise != USUAL,
             f"contacts {self.contact_source}": self.contact_source != "given",
-            f"{self.grasp} grasp": self.grasp != TrialConfig.grasp,
-            f"robot error {self.robot_error}": self.robot_error != NO_ROBOT_ERROR,
-            f"fidelity {self.fidelity}": self.fidelity != "full",
-            f"{self.max_reobservations} reobservations": self.max_reobservations > 0,
-            f"sensor {self.ft_sensor}": self.ft_sensor != TrialConfig.ft_sensor,
-            f"assumed error {self.assumed_robot_error}": self.assumed_robot_error != TrialConfig.assumed_robot_error,
-            f"abstaining below {self.min_predicted_success:g}": self.min_predicted_success > 0,
         }
+        for name in _OTHERS:
+            value = getattr(self, name)
+            words[f"{SETTINGS[name].words} {value}"] = value != SETTINGS[name].default
         return ", ".join(text for text, is_shown in words.items() if is_shown)
 
 
-CONDITION_FIELDS = tuple(field.name for field in fields(Condition))
+CONDITION_FIELDS = (*_OWN, *_OTHERS)
 """Columns of a trial record, too."""
-_OTHERS = tuple(field.name for field in fields(Condition)[8:])
 
 
 def noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> str:
@@ -119,7 +126,7 @@ def rank_contact_source(contact_source: str) -> tuple[int, str]:
 
 def order(c: Condition) -> tuple[Any, ...]:
     """How conditions are sorted: by setting, with defaults first, then by method (`oracle` first), then by noise."""
-    others = ((getattr(c, name) != getattr(TrialConfig, name), getattr(c, name)) for name in _OTHERS)
+    others = ((getattr(c, name) != SETTINGS[name].default, getattr(c, name)) for name in _OTHERS)
     noise = (c.noise != USUAL, c.noise, rank_contact_source(c.contact_source))
     return (
         *(c.scenario, c.clearance_mm, noise, c.human_error_scale, *others),
@@ -143,7 +150,8 @@ def by_condition(trials: Trials) -> dict[Condition, Trials]:
     """
     trials.find_secret_seed()
     drawn = trials.where(~np.isnan(trials.number("noise_mm")))
-    found = {Condition(*key): own for key, own in drawn.parts(CONDITION_FIELDS).items()}
+    parts = drawn.parts(CONDITION_FIELDS).items()
+    found = {Condition(**dict(zip(CONDITION_FIELDS, key, strict=True))): own for key, own in parts}
     for condition, own in found.items():
         seeds = own.number("seed")
         twice = seeds[1:][np.diff(seeds) == 0]

@@ -1,7 +1,7 @@
 """Compare two sweeps trial by trial: two versions, two machines, two fidelities."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -240,4 +240,4 @@ def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Lin
 
 
 def _at_any_fidelity(condition: Condition) -> Condition:
-    return replace(condition, fidelity="full")
+    return condition.with_default("fidelity")

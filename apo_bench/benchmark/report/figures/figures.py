@@ -132,7 +132,7 @@ def _over_reobservations(results: Sequence[ConditionResult]) -> list[Mark]:
     several = len({c.max_reobservations for c in results if may_reobserve(c.method)}) > 1
     return [
         Mark(
-            replace(c.setting, max_reobservations=0).title,
+            c.setting.with_default("max_reobservations").title,
             f"{c.method}, {c.noise_words}",
             c.max_reobservations,
             f"{c.max_reobservations}",

@@ -1,5 +1,5 @@
 "use strict";
-// The trials of a cell: unpacked when the first one is opened, shown a hundred at a time.
+// The trials of a condition: unpacked when the first one is opened, shown a hundred at a time.
 (() => {
   const STEP = 100;
   let kept = null;
@@ -31,7 +31,7 @@
     const seed = found.columns.seed[i];
     const numbers = found.numbers.map(([name, , digits]) => written(name, found.columns[name][i], digits));
     return { seed, numbers, verdict: word("verdict"), why: word("why"), sentence: word("sentence"),
-      predicted: word("predicted"), command: `${word("command")} --seed ${seed}` };
+      predicted: word("failure_prediction"), command: `${word("command")} --seed ${seed}` };
   }
 
   // Tables that go on to the right fade there.
@@ -113,7 +113,7 @@
     table.append(head(found), body);
     const scroll = made("div", null, { className: "scroll tall", tabIndex: 0 });
     scroll.setAttribute("role", "region");
-    scroll.setAttribute("aria-label", "trials of the cell");
+    scroll.setAttribute("aria-label", "trials of the condition");
     scroll.append(table);
     const more = made("button", null, { type: "button", className: "more" });
     const show = () => {
