@@ -54,7 +54,17 @@ DROPPED = {
     ),
     *("pose_source", "noise", "grasp", "arm", "robot_error", "contact_source", "method", "max_reobservations"),
     *("ft_sensor", "assumed_robot_error", "min_predicted_success", "seed", "secret_seed", "timestep_s", "fidelity"),
-    *("human_error_covariance", "level", "sentence", "joint_control", "why", "trace", "assembly", "assumed", "believed"),
+    *(
+        "human_error_covariance",
+        "level",
+        "sentence",
+        "joint_control",
+        "why",
+        "trace",
+        "assembly",
+        "assumed",
+        "believed",
+    ),
 }
 """Not kept of what the package returns, by neutral names: settings, texts, provenance, iterations of solvers."""
 

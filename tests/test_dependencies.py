@@ -76,7 +76,9 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data", "film", "range", "tables")))
+    optional = stated(
+        *(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data", "film", "range", "tables"))
+    )
     assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT) - ASKED_FOR
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional

@@ -5,7 +5,7 @@ from shutil import copyfile
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
-from apo_bench.io import read_text
+from apo_bench.io import read_text, write_file
 from apo_bench.scenario.scenario import Scenario
 
 _LARGEST_BYTES = 1 << 22
@@ -35,5 +35,5 @@ def save_scenario(scenario: Scenario, folder: str | Path) -> Path:
             copy = target.parent / file.relative_to(source.parent)
             copy.parent.mkdir(parents=True, exist_ok=True)
             copyfile(file, copy)
-    target.write_text(text, encoding="utf-8")
+    write_file(target, text)
     return target

@@ -118,7 +118,7 @@ def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> 
     worse = pickle.loads(pickled).reset(seed=SEED, options={"noise_level": 3})
     assert same(worse, APOReplay(SMALL, pose_source="depth-camera", noise_level=3).reset(seed=SEED))
     assert not same(worse, usual)
-    with pytest.raises(InputError, match="give one number, mm per ray"):
+    with pytest.raises(InputError, match="noise level must be"):
         env.reset(options={"noise_level": (1, 1)})
 
 
@@ -157,9 +157,9 @@ def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> 
     [
         ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'noise_level'. Known: clearance_mm, human"),
         ([("noise_level", 1)], "a dict with trial, noise_level, human_error_scale, clearance_mm is"),
-        ({"noise_level": None}, "the noise level None was given"),
+        ({"noise_level": None}, "noise level must be"),
         ({"noise_level": 2, "human_error_scale": 11}, "human error scale must be a number from 0 to 10, got 11"),
-        ({"noise_level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
+        ({"noise_level": 2, "clearance_mm": 5.1}, "clearance mm must be a number from 0 to 5, got 5.1"),
     ],
 )
 def test_wrong_options_are_refused_and_change_nothing(env: APOReplay, options: Any, words: str) -> None:

@@ -56,7 +56,8 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"), [("ft_sensor", "unknown force-torque sensor"), ("assumed_robot_error", "unknown stated error")]
+    ("wrong", "said"),
+    [("ft_sensor", "unknown force-torque sensor"), ("assumed_robot_error", "unknown assumed robot error")],
 )
 def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
     with pytest.raises(InputError, match=said):

@@ -58,7 +58,7 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
     assert "run again" in made[0].words
     other = [{**r, "config_hash": "0" * 16} for r in trials]
     older, _ = failure_pictures(sample(other, 1), write(tmp_path / "older", other))
-    assert "as the row says" in older[0].words
+    assert "as the record says" in older[0].words
     assert older[0].jpeg != made[0].jpeg
     page = report(write(tmp_path / "page", other), pictures=1, draw=failure_pictures)
     assert page.pictures == 1
@@ -75,7 +75,7 @@ def test_a_page_without_graphics_says_so(
     def refuse(*_: object, **__: object) -> None:
         raise InputError("no picture can be drawn here (no EGL); install libegl1.")
 
-    monkeypatch.setattr(render, "picture", refuse)
+    monkeypatch.setattr(render, "draw_picture", refuse)
     made = report(write(tmp_path / "run", trials), pictures=2, draw=failure_pictures)
     assert made.pictures == 0
     assert "No picture: no picture can be drawn here" in pages.words(made.page)
