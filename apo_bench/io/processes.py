@@ -1,4 +1,4 @@
-"""The environment of processes that are started."""
+"""Environment variables for subprocesses that the package starts."""
 
 import os
 from collections.abc import Iterator, Mapping

@@ -65,7 +65,8 @@ RAISED = {
     "name": "the noise model 'name' failed: it raised NameError(\"name 'no_such_name' is not defined\"); correct it",
     "imports": "the noise model 'imports' failed: it raised ModuleNotFoundError(",
     "plain": "the noise model 'plain' failed: it raised TypeError('of my own'); correct it, or use another.",
-    "Init": "the noise model 'users_code:Init' failed: it raised RuntimeError('init oops'); correct it, or use another.",
+    "Init": "the noise model 'users_code:Init' failed: it raised RuntimeError('init oops'); "
+    "correct it, or use another.",
     "Slow": "the noise model 'users_code:Slow' failed: it raised KeyError('no deviation'); correct it, or use another.",
 }
 

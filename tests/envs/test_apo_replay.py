@@ -424,7 +424,8 @@ def test_corrected_wraps_only_this_environment(env: APOReplay) -> None:
 
 def test_make_takes_every_argument_and_a_copy_travels() -> None:
     made = gymnasium.make(
-        "APOReplay-v0", scenario="block_on_block", noise_level=(0.5, 0.25), human_error_scale=0.0, noise="isotropic", grasp="weld",
+        "APOReplay-v0", scenario="block_on_block", noise_level=(0.5, 0.25), human_error_scale=0.0,
+        noise="isotropic", grasp="weld",
         clearance_mm=0.4, arm="six_axis", render_mode=None,
     )  # fmt: skip
     seen, _ = made.reset(seed=1)

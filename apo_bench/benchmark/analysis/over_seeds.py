@@ -144,7 +144,9 @@ def mean_surprise(values: Array, counts: Array, mean: float, low: float = 0.0, h
 
 
 def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interval:
-    """The means that are not too surprising at 95 %; nothing is known without a value.
+    """The 95 % confidence interval of a mean by empirical likelihood, which needs no normal distribution.
+
+    It is the whole range without a value.
 
     Args:
         values: (n,) from `low` to `high`, one per seed.

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, and the exit code of a command without a result."""
+"""Arguments, options and exit codes that several commands share."""
 
 from pathlib import Path
 from typing import Annotated, Any

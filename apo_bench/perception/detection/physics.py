@@ -109,9 +109,8 @@ def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap
 
 
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
-    """Of what was let go of: that it rests on nothing, or that its weight acts beside what carries it.
-
-    Where a face above holds it down, it may lean. Round parts are not judged.
+    """Negative log-likelihood that a released part stays: larger if nothing supports it, or if its weight acts outside
+    its support polygon. It is 0 for round parts, for parts that a face above holds down, and for unobserved operations.
     """
     solids = at.seen.assembly.solids
     if not at.seen.observed[at.k] or any(solids[part].rounds for part in at.moves):

@@ -80,15 +80,15 @@ class Spiral:
         return PITCH_M * self._angle / (2.0 * math.pi)
 
     def __call__(self, force: Sequence[float]) -> Array | None:
-        """How far the tip moves from where it began, (3,), world, [m]; None at the end."""
+        """Displacement of the tip from the start of the search, (3,), world, [m]; None when the search ends."""
         push, across = self._filtered(force)
         side = math.hypot(*across)
         self.found = self._ahead > self.deep
         self._left = self._left - 1
         if self.found or self._r > self.radius or self._left < 0 or side > push + self.guard.newton:
             return None
-        # Pushed back, the tip goes on by what yields to the rest of the press, and along r = pitch angle / 2 pi by
-        # d angle = d arc / r; let go of, it goes ahead.
+        # In contact the tip pushes with the force that is left up to `press`, and follows the spiral
+        # radius = pitch * angle / (2 pi) at constant arc speed: d angle = d arc / radius. Without contact it advances.
         if push > self.press / 4:
             self._speed = _YIELD * (self.press - push)
             self._angle += self.step_s * _ACROSS / max(self._r, _INNER_M)

@@ -81,7 +81,10 @@ def _find_free(facets: Facets, left: Any) -> Any:
 
 
 def _drop_bands(mesh: Mesh, facets: Facets, walls: list[FoundWall]) -> list[FoundWall]:
-    """Without bands of tori, spheres and free surfaces, which go over into others like them at both ends."""
+    """Remove walls that are only strips of a torus, a sphere or a free surface.
+
+    The mesh approximates such a surface by strips (bands), each of which continues smoothly in the next at both ends.
+    """
     of = _wall_of_pieces(facets, walls)
     bands: set[int] = set()
     ends: list[list[_End]] = []
