@@ -16,6 +16,8 @@ VALUES: dict[str, str] = {}
 EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
 KEYS = {
+    "extra_operations": "extra_steps",
+    "test_passes": "consistency_passes",
     "seen_again": "reobservations",
     "wrong_relation": "wrong_contact",
     "touches_refused": "probe_contacts_rejected",
@@ -33,7 +35,7 @@ KEYS = {
     "chi_square_freedom": "chi_square_dof",
     "freed": "corrected_operations",
     "tried": "tried_corrections",
-    "left_out": "inferred_operations",
+    "left_out": "rejected_observations",
     "predicted": "failure_prediction",
     "touches": "probe_contacts",
     "targets": "step_poses",

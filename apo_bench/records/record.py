@@ -138,7 +138,7 @@ class TrialRecord(_Columns, total=False):
     """Operations whose motion parameters were corrected."""
     tried_corrections: list[FreedSet] | None
     """Which operations were freed at which step, and the gap that was left."""
-    extra_operations: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
+    extra_steps: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
     """Steps of the plan beyond doing every operation once."""
     fit_adjustments: list[FreeMoved] | None
     """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
@@ -156,13 +156,13 @@ class TrialRecord(_Columns, total=False):
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
-    test_passes: bool | None
+    consistency_passes: bool | None
     """Whether contacts and observed poses are consistent by that test."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
     dropped: list[Name] | None
     """Contacts that the corrector left out."""
-    inferred_operations: list[_Operation] | None
+    rejected_observations: list[_Operation] | None
     """Operations that were inferred, since nothing was observed of them or the corrector rejects it."""
     reobservations: _Count | None
     """How many operations were observed again, all together; null without a corrector."""

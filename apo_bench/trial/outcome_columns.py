@@ -41,7 +41,7 @@ def _test(correction: Correction | None) -> TrialRecord:
         return {}
     inferred: TrialRecord = {
         "dropped": list(correction.dropped),
-        "inferred_operations": [k + 1 for k in correction.left_out],
+        "rejected_observations": [k + 1 for k in correction.left_out],
     }
     test = correction.test
     if test is None:
@@ -50,7 +50,7 @@ def _test(correction: Correction | None) -> TrialRecord:
         "chi_square": float(test.chi_square) if math.isfinite(test.chi_square) else None,
         "chi_square_dof": int(test.freedom),
         "p_value": finite(test.p_value),
-        "test_passes": bool(test.passes),
+        "consistency_passes": bool(test.passes),
         "suspects": [suspect.relation for suspect in test.ambiguous],
     }
 
@@ -83,7 +83,7 @@ def method_columns(result: MethodResult) -> TrialRecord:
             for step, free, gap_m in result.correction.tried
         ]
     if result.plan is not None:
-        columns["extra_operations"] = len(result.plan.schedule) - len(result.plan.assembly)
+        columns["extra_steps"] = len(result.plan.schedule) - len(result.plan.assembly)
     if result.fitting is not None:
         moves = result.fitting.moves
         columns["fit_adjustments"] = [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moves]

@@ -41,7 +41,7 @@ def row(seed: int) -> dict[str, Any]:
     key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0)
     key = (*key, "wrist", "matched", 0.0, seed)
     ended = {"demonstration": "ok", **end_record(Outcome("done", "ok", None, "all was done"), success=True)}
-    ended |= {"sim_time_s": 20.0, "extra_operations": 0}
+    ended |= {"sim_time_s": 20.0, "extra_steps": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
     alike = {
         "env_id": "APOReplay-v0",

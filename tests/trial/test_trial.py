@@ -99,7 +99,7 @@ def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None
         assert (fits["fails"], fits["operation"], fits["code"]) == (False, None, "ok")
         assert fits["size_mm"] < 0.1
     assert [rows[method]["tried_corrections"] for method in rows] == [[], [], []]
-    assert [rows[method]["extra_operations"] for method in rows] == [0, 0, 0]
+    assert [rows[method]["extra_steps"] for method in rows] == [0, 0, 0]
 
 
 def doubts(seen: Observation) -> Correction:
@@ -116,9 +116,13 @@ def test_the_row_says_what_the_correction_says_of_itself(
     monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: doubts(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["chi_square"], row["chi_square_dof"], row["p_value"]) == (30.0, 5, 1e-5)
-    assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
+    assert (row["consistency_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
     for method in ("oracle", "uncorrected", "paper"):
-        assert (rows[method]["test_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (None, None, None)
+        assert (rows[method]["consistency_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (
+            None,
+            None,
+            None,
+        )
     assert [rows[method]["dropped"] for method in ("oracle", "uncorrected", "paper")] == [None, None, []]
 
 
@@ -199,7 +203,7 @@ def test_a_row_without_replay_is_a_failure_with_null_physics(
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
     assert (row["corrected_operations"], row["gap_after_mm"]) == ([3, 2], None)
     assert row["tried_corrections"] == [{"step": 3, "free": [3], "gap_mm": None}]
-    assert row["failure_prediction"] is row["extra_operations"] is None
+    assert row["failure_prediction"] is row["extra_steps"] is None
     assert row["reached"] is row["sim_time_s"] is row["conditions"] is None
 
 

@@ -17,7 +17,7 @@ def efforts(records: Records) -> list[Line]:
             "scenario": scenario,
             "method": method,
             "trials": len(own),
-            "extra_operations": float(own.number("extra_operations").mean()),
+            "extra_steps": float(own.number("extra_steps").mean()),
             "sim_time_s": float(np.median(own.number("sim_time_s"))),
             "displaced_mm": float(np.nan_to_num(own.number("displaced_mm")).max()),
         }

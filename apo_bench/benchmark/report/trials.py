@@ -17,7 +17,7 @@ NUMBERS: Mapping[str, str] = {
     "pose_error_free_mm": "reached error, free [mm]",
     "p_value": "p of the test",
     "predicted_success": "predicted success",
-    "extra_operations": "extra operations",
+    "extra_steps": "extra steps",
     "peak_force_n": "peak force [N]",
     "sim_time_s": "simulated [s]",
 }

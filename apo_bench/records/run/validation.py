@@ -54,7 +54,7 @@ _TOGETHER = (
     ("contacts_true_positive", "contacts_false_negative", "contacts_false_positive"),
     ("planned_error_fixed_mm", "planned_error_free_mm"),
     ("pose_error_fixed_mm", "pose_error_free_mm"),
-    ("test_passes", "suspects"),
+    ("consistency_passes", "suspects"),
     ("probe_contacts", "probe_contacts_rejected", "base_error_estimate_mm", "base_error_estimate_deg"),
 )
 """Columns that are null together."""
@@ -143,8 +143,8 @@ def _contradiction(record: Mapping[str, Any]) -> str:
     failure = record["failure_stage"] is not None and record["failure_code"] is not None
     if (success is False and not failure) or (success and failure):
         return "field failure_stage: a failure has a stage and a code, a success has none"
-    if success and None in (record.get("sim_time_s"), record.get("extra_operations")):
-        return "field sim_time_s: a success has sim_time_s and extra_operations"
+    if success and None in (record.get("sim_time_s"), record.get("extra_steps")):
+        return "field sim_time_s: a success has sim_time_s and extra_steps"
     if record.get("as_demonstrated") and not success:
         return "field as_demonstrated: it is true, so success must be true as well"
     return ""

@@ -24,7 +24,7 @@ from tests import pages
 
 UNKNOWN = dict.fromkeys(
     (
-        *("chi_square", "chi_square_dof", "p_value", "test_passes", "suspects", "dropped", "wrong_contact"),
+        *("chi_square", "chi_square_dof", "p_value", "consistency_passes", "suspects", "dropped", "wrong_contact"),
         *("inside_95", "planned_error_fixed_mm", "planned_error_free_mm"),
     )
 )
@@ -69,7 +69,7 @@ def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True,
         "failure_code": "force_stop" if failed else None,
         "failure_operation": 3 if failed else None,
         "failure_prediction": None if success is None else foretold(failed),
-        "extra_operations": None if success is None else 0,
+        "extra_steps": None if success is None else 0,
         "sim_time_s": None if success is None else 20.0,
         "displaced_mm": None if success is None else 0.1,
     } | more
@@ -260,9 +260,9 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
 def test_effort_counts_what_was_right() -> None:
     rows = [
         row("paper", 0),
-        row("paper-track", 0, extra_operations=2, sim_time_s=26.0, displaced_mm=0.3),
-        row("paper-track", 1, extra_operations=4, sim_time_s=28.0, displaced_mm=0.2),
-        row("paper-track", 2, success=False, extra_operations=9, sim_time_s=99.0, displaced_mm=9.0),
+        row("paper-track", 0, extra_steps=2, sim_time_s=26.0, displaced_mm=0.3),
+        row("paper-track", 1, extra_steps=4, sim_time_s=28.0, displaced_mm=0.2),
+        row("paper-track", 2, success=False, extra_steps=9, sim_time_s=99.0, displaced_mm=9.0),
         row("uncorrected", 0, success=False),
     ]
     assert [list(line.values()) for line in efforts(rows)] == [

@@ -56,7 +56,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         ended = end_record(
             Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
         )
-        ended |= {"demonstration": "ok", "sim_time_s": 1.0, "extra_operations": 0}
+        ended |= {"demonstration": "ok", "sim_time_s": 1.0, "extra_steps": 0}
         return {
             "schema": RECORD_SCHEMA,
             "env_id": ENV_ID,

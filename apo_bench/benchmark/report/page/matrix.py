@@ -26,7 +26,7 @@ from apo_bench.records import Limits, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.trials import Trials
 
-_DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
+_DECIMALS = {"extra_steps": 0, "least_overlap": 2, "peak_force_n": 1, "sim_time_s": 1}
 """Of numbers; of those in mm and degrees, and of others, three."""
 
 

@@ -65,7 +65,7 @@ def effort_table(lines: Sequence[Line]) -> Table:
         (
             *_METHOD,
             Column("trials", "right"),
-            Column("extra_operations", "extra operations", text="{extra_operations:.1f}"),
+            Column("extra_steps", "extra steps", text="{extra_steps:.1f}"),
             Column("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
             Column("displaced_mm", "pushed at most", text="{displaced_mm:.2f} mm"),
         ),
