@@ -9,9 +9,9 @@ from apo_bench.benchmark.rate_table import RateTable
 from apo_bench.benchmark.session import name_functions
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
 from apo_bench.benchmark.sweeps.sweep import run_sweep
-from apo_bench.errors import require, require_known
+from apo_bench.errors import require, require_known, shown
 from apo_bench.names import SESSION
-from apo_bench.records import TrialConfig, TrialRecord
+from apo_bench.records import METHODS, TrialConfig, TrialRecord
 from apo_bench.scenario import Scenario, is_named, scenario_path
 
 Method = str | Callable[..., Any]
@@ -39,9 +39,9 @@ def evaluate(
         workers: Processes; 1 runs the trials in this process, as functions of a notebook and lambdas need.
         save: Folder of the records, as `apo-bench sweep` writes it; the same call continues an interrupted run.
             Default: a temporary folder.
-        settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ...; the
-            defaults are those of one trial, and `seed` is the first seed. A scenario may be a `Scenario`, and `noise` a
-            function.
+        settings: Settings of `TrialConfig` and `noise_level`, one value or several: `scenario`, `noise_level`, ... A
+            pair of mm and degrees is `[(1, 0.5)]`. The defaults are those of one trial; `seed` is the first seed. A
+            scenario may be a `Scenario`, and `noise` a function.
 
     Returns:
         A table with the success rate of each condition.
@@ -53,6 +53,10 @@ def evaluate(
     for name in settings:
         require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))
     settings = {"noise_level": 1.0, "human_error_scale": TrialConfig.human_error_scale} | settings
+    require(
+        isinstance(seeds, int) and not isinstance(seeds, bool) and seeds >= 1,
+        f"seeds must be a whole number of at least 1, got {shown(seeds)}.",
+    )
     labelled = dict(_label(method, "method"))
     noises = dict(_label(settings.pop("noise", ()), "noise"))
     functions = {label: each for label, each in (labelled | noises).items() if callable(each)}
@@ -78,7 +82,7 @@ def evaluate(
         temporary = TemporaryDirectory(prefix="apo-bench-") if save is None else None
         folder = Path(temporary.name if temporary else save or "")
         records = run_sweep(grid, folder, workers=None if workers == 1 else workers)
-    labels = {name: label for label, name in names.items()}
+    labels = {called[label]: label for label in called}
     return RateTable(tuple(_relabel(record, labels) for record in records), folder, temporary)
 
 
@@ -97,8 +101,15 @@ def _scenario_source(scenario: str | Path | Scenario) -> str:
 def _label(given: Any, kind: str) -> Iterable[tuple[str, Any]]:
     """Labels of methods or noise models, and these."""
     if isinstance(given, Mapping):
+        for label, each in given.items():
+            require(isinstance(label, str), f"a label must be a text, got {shown(label)}.")
+            require(label not in METHODS or each == label, f"'{label}' is a method of the package; use another label.")
         return given.items()
-    several = [given] if isinstance(given, str) or callable(given) else list(given)
+    several = [given] if isinstance(given, str) or callable(given) else given
+    require(
+        isinstance(several, Iterable) and all(isinstance(each, str) or callable(each) for each in several),
+        f"{kind} must be a name, a function, or several of these, got {shown(given)}.",
+    )
     pairs = [
         (each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__), each) for each in several
     ]

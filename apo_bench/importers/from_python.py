@@ -5,7 +5,7 @@ from pathlib import Path
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
-from apo_bench.scenario import Scenario, load_scenario
+from apo_bench.scenario import Scenario, load_scenario, scenario_path
 
 
 @check_arguments
@@ -89,7 +89,7 @@ def check_scenario(scenario: str | Path | Scenario, *, seeds: int = 5, fidelity:
     """Check a scenario from its syntax to trials in which the robot knows the true poses.
 
     Args:
-        scenario: A scenario file, or a scenario that was read from one.
+        scenario: A name, a scenario file, or a scenario that was read from one.
         seeds: Trials that run; 0 runs none.
         fidelity: As in `TrialConfig`.
 
@@ -101,7 +101,7 @@ def check_scenario(scenario: str | Path | Scenario, *, seeds: int = 5, fidelity:
     """
     from apo_bench.importers.assembly.checking import check_file
 
-    source = scenario.source if isinstance(scenario, Scenario) else Path(scenario)
+    source = scenario.source if isinstance(scenario, Scenario) else scenario_path(scenario)
     require(source is not None, "a scenario was given that was not read from a file; give its file.")
     assert source is not None
     return tuple(str(finding.sentence) for finding in check_file(source, seeds, fidelity) if not finding.ok)

@@ -1,5 +1,6 @@
 """The six lines of a trial that answer a person."""
 
+import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -49,7 +50,8 @@ def summary_lines(record: TrialRecord, scenario: str, observation: Path | None =
     if observation is None:
         again = replay_command(record, {record["scenario"]: scenario})
     else:
-        again = f"apo-bench run {scenario} --observation {observation} --method {record['method']}"
+        command = replay_command(record, {record["scenario"]: scenario}, measured=True)
+        again = f"{command} --observation {shlex.quote(str(observation))}"
     return [
         ("trial", f"{record['scenario']}, {', '.join(_describe_settings(record))}"),
         ("correction", correction),

@@ -17,8 +17,17 @@ Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
 
-def replay_command(record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
-    """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance."""
+def replay_command(
+    record: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS, *, measured: bool = False
+) -> str:
+    """`apo-bench run SCENARIO .. --seed N`, quoted for a shell; of the defaults it names method and clearance.
+
+    Args:
+        measured: Whether the observation comes from a file: settings of a random draw are left out.
+    """
+    if measured:
+        drawn = {name: info.default for name, info in SETTINGS.items() if info.drawn or name == "noise"}
+        return without_seed({**record, **drawn}, files, limits)
     return f"{without_seed(record, files, limits)} --seed {record['seed']}"
 
 
