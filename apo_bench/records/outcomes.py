@@ -27,7 +27,7 @@ CODES = MappingProxyType(
         "not_finite": "the correction holds a number that is not finite",
         "raised": "the corrector raised an error or returned what it must not",
         # promise
-        "abstained": "the plan promised too little to be carried out",
+        "abstained": "the predicted success is too low",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
         "unreachable_start": "the arm cannot reach {part} where operation {operation} picks it up",

@@ -203,7 +203,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
     copied = copy.deepcopy(made)
     second = made.reobserve([0, 1])
     np.testing.assert_array_equal(copied.reobserve([0]).poses, second.poses)
-    with pytest.raises(InputError, match="none is left"):
+    with pytest.raises(InputError, match="no reobservation is left"):
         made.reobserve([0])
     corrected.reset(seed=SEED)
     np.testing.assert_array_equal(again[1].poses, again[0].poses)

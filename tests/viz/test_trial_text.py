@@ -39,7 +39,7 @@ def test_the_last_line_shows_the_trial_again() -> None:
     file = "own/tower.toml"
     assert summary_lines(record(True), file)[5][1].startswith(f"apo-bench run {file} ")
     measured = summary_lines(record(True, noise_mm=None, noise_deg=None), file, Path("seen.csv"))
-    assert measured[5][1] == f"apo-bench run {file} --observation seen.csv --method contact --view"
+    assert measured[5][1] == f"apo-bench run {file} --clearance-mm 0.25 --method contact --observation seen.csv --view"
     assert "measured observation" in measured[0][1]
 
 

@@ -37,7 +37,7 @@ def draw_picture(
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
-        camera: `overview`, `close`, `top`, or a `aim_camera`.
+        camera: `overview`, `close`, `top`, or the result of `aim_camera`.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
@@ -239,7 +239,7 @@ def _draw(
 def _check_camera(world: World, camera: SceneCamera) -> None:
     names = [world.model.camera(i).name for i in range(world.model.ncam)]
     if isinstance(camera, str):
-        require_known("camera", camera, names, rest=" Or give a aim_camera.")
+        require_known("camera", camera, names, rest=" Or give the result of aim_camera.")
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:

@@ -70,7 +70,7 @@ def test_a_look_at_what_is_not_there_is_refused_and_costs_nothing(asked):
 
 
 def test_no_more_looks_than_allowed():
-    with pytest.raises(InputError, match=r"none is left; ask `look\.left` before"):
+    with pytest.raises(InputError, match="no reobservation is left"):
         looks(0)([0])
     with pytest.raises(InputError, match="max reobservations must be a whole number from 0 to 100, got -1"):
         looks(-1)
