@@ -55,7 +55,10 @@ class Reobservations:
     def __call__(self, operations: Collection[int]) -> Observation:
         n = len(self._assembly)
         chosen = {*operations}
-        require(self.left >= 1, "no reobservation is left; check `reobserve.left` before, or give a larger max_reobservations.")
+        require(
+            self.left >= 1,
+            "no reobservation is left; check `reobserve.left` before, or give a larger max_reobservations.",
+        )
         require(
             chosen and all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen),
             f"operations {[*chosen]} cannot be reobserved; give one or more whole numbers from 0 to {n - 1}.",
