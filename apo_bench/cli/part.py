@@ -50,7 +50,7 @@ def part_import(
     source, solids = raw_solids(file, unit, round_sides)
     require(
         not names or len(solids) <= 1,
-        f"--name renames the faces of one solid, and {file} holds {len(solids)}; import each from a file of its own.",
+        f"--name renames the faces of one solid, and {file} holds {len(solids)}; import each from its own file.",
     )
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)

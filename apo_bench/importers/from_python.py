@@ -18,7 +18,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
         unit: Unit of the file: mm, in, m, cm, ft or um. Default: as the file states.
 
     Returns:
-        The part files (.xml), which scenario files name; round faces are in a TOML file beside each.
+        The part files (.xml), which scenario files name; round faces are in a TOML file next to each.
 
     Raises:
         InputError: The file cannot be read, or a solid makes no part.
@@ -52,7 +52,7 @@ def import_assembly(
 
     Args:
         files: One file of several solids, or several files in one frame.
-        out: The scenario file (.toml); its parts are in a folder beside it. Default: `NAME.toml` in the current
+        out: The scenario file (.toml); its parts are in a folder next to it. Default: `NAME.toml` in the current
             folder, where NAME is that of the first file.
         unit: Unit of the files: mm, in, m, cm, ft or um. Default: as they state.
         up: The axis of the files that is up: x, y, z, -x, -y or -z. Default: z, or one that has an order.

@@ -32,15 +32,15 @@ def demonstrate(
     rng: np.random.Generator,
     watch: Hooks | Callable[[Any], None] | None = None,
 ) -> Demonstration:
-    """Assemble by hand, with an error of `human_error` times the scenario's carelessness.
+    """Assemble by hand, with the human error of the scenario times `human_error`.
 
-    The error is put into the operation that the scenario names, and parts that are put against a displaced one follow
-    it. At the last operation the other hand corrects all of them; those small motions show in `final`, not in the
-    goals, since these parts are not observed again.
+    The operation that the scenario names has the error, and parts that are placed against its part follow it. At the
+    last operation the other hand corrects all of them; these small motions show in `final`, not in `poses`, since these
+    parts are not observed again.
 
     Args:
-        human_error: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
-        rng: Drawn from in the same way whatever `human_error` is, so that hands of one seed differ in size only.
+        human_error: 0 is an ideal human, 1 the human error of the scenario, another number a multiple of it.
+        rng: The same numbers are drawn whatever `human_error` is, so that errors of one seed differ in size only.
         watch: Called with the `MjData` at the start and every `period_s` of simulated time, an attribute of it, by
             default 20 ms; or several `Hooks`. The demonstration is the same with and without it.
     """

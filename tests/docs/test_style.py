@@ -1,0 +1,58 @@
+"""Help texts, public docstrings and error messages use plain technical words."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+import apo_bench
+from apo_bench.cli.app import app
+
+PACKAGE = Path(apo_bench.__file__).parent
+FORBIDDEN = re.compile(
+    r"\b(shall|whoever|anew|besides?|foretell\w*|mend(s|ed|ing)?|of its own|of one's own|comes? along|nobody asks"
+    r"|careless\w*|by heart|salt(ed)?|the eye)\b",
+    re.IGNORECASE,
+)
+"""Words that the documentation of Gymnasium and mink would not use, and words that this package used before."""
+
+
+def help_texts() -> Iterator[tuple[str, str]]:
+    todo = [("apo-bench", typer.main.get_command(app))]
+    while todo:
+        name, command = todo.pop()
+        yield name, command.help or ""
+        yield from ((f"{name} {each.name}", getattr(each, "help", None) or "") for each in command.params)
+        todo += [(f"{name} {key}", each) for key, each in getattr(command, "commands", {}).items()]
+
+
+def public_docstrings() -> Iterator[tuple[str, str]]:
+    for name in apo_bench.__all__:
+        public = getattr(apo_bench, name)
+        if inspect.isclass(public):
+            members = inspect.getmembers(public, lambda each: inspect.isfunction(each) or isinstance(each, property))
+            own = [(key, each) for key, each in members if not key.startswith("_")]
+            yield from ((f"{name}.{key}", inspect.getdoc(each) or "") for key, each in own)
+        yield name, inspect.getdoc(public) or ""
+
+
+def messages() -> Iterator[tuple[str, str]]:
+    """Texts in the calls that raise an error."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+            if called in ("require", "InputError", "ArgumentError"):
+                for text in ast.walk(node):
+                    if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                        yield f"{path.relative_to(PACKAGE)}:{text.lineno}", text.value
+
+
+@pytest.mark.parametrize("texts", [help_texts, public_docstrings, messages])
+def test_texts_for_users_are_plain(texts: type[Iterator[tuple[str, str]]]) -> None:
+    assert [(where, found[0]) for where, text in texts() if (found := FORBIDDEN.search(text))] == []
