@@ -7,7 +7,7 @@ from typing import Any
 
 from apo_bench.benchmark.rate_table import RateTable
 from apo_bench.benchmark.session import name_functions
-from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, as_tuple
 from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.errors import require, require_known, shown
 from apo_bench.names import SESSION
@@ -60,9 +60,7 @@ def evaluate(
     labelled = dict(_label(method, "method"))
     noises = dict(_label(settings.pop("noise", ()), "noise"))
     functions = {label: each for label, each in (labelled | noises).items() if callable(each)}
-    scenarios = settings.get("scenario", ())
-    several = (scenarios,) if isinstance(scenarios, str | Path | Scenario) else tuple(scenarios)
-    settings["scenario"] = tuple(map(_scenario_source, several))
+    settings["scenario"] = tuple(map(_scenario_source, as_tuple(settings.get("scenario", ()))))
     with name_functions(functions) as names:
         local = [label for label, name in names.items() if name.startswith(f"{SESSION}:")]
         require(

@@ -114,15 +114,24 @@ def write_new_scenario(
         choices: Values of --up, --fixed, --order, --clearance-mm and --max-overlap-mm.
     """
     from apo_bench import load_scenario
-    from apo_bench.importers.assembly.posed import UPS, read_posed
-    from apo_bench.importers.assembly.upright import new_upright_scenario
-    from apo_bench.importers.assembly.writing import choice_lines, write_scenario
+    from apo_bench.importers.assembly.from_poses import scenario_from_poses
+    from apo_bench.importers.assembly.posed import UPS
+    from apo_bench.importers.assembly.writing import choice_lines
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
     require(up is None or up in UPS, f"--up must be one of {', '.join(UPS)}, got {up}.")
     names = [name.strip() for name in order.split(",")] if order else []
-    made = new_upright_scenario(read_posed(poses, parts), up, fixed or (), clearance_mm, max_overlap_mm, names)
-    write_scenario(made, out, f"Assembly of {out.stem}", source)
+    made = scenario_from_poses(
+        poses,
+        parts,
+        out,
+        source,
+        up=up,
+        fixed=fixed or (),
+        order=names,
+        clearance_mm=clearance_mm,
+        max_overlap_mm=max_overlap_mm,
+    )
     typer.echo("\n".join(choice_lines(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; next: apo-bench scenario check {shlex.quote(str(out))}")

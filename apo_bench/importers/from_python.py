@@ -69,9 +69,7 @@ def import_assembly(
         RuntimeError: There is no order in which the parts can be assembled.
     """
     from apo_bench.importers.assembly.from_cad import import_assembly as write_parts
-    from apo_bench.importers.assembly.posed import read_posed
-    from apo_bench.importers.assembly.upright import new_upright_scenario
-    from apo_bench.importers.assembly.writing import write_scenario
+    from apo_bench.importers.assembly.from_poses import scenario_from_poses
 
     sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
     require(sources, "no file was given; give a CAD file of several solids, or several files.")
@@ -79,8 +77,17 @@ def import_assembly(
     require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
     require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
     poses, _ = write_parts(sources, target.with_name(f"{target.stem}_parts"), unit)
-    made = new_upright_scenario(read_posed(poses, []), up, tuple(fixed), clearance_mm, max_overlap_mm, list(order))
-    write_scenario(made, target, f"Assembly of {target.stem}", ", ".join(source.name for source in sources))
+    scenario_from_poses(
+        poses,
+        (),
+        target,
+        ", ".join(source.name for source in sources),
+        up=up,
+        fixed=fixed,
+        order=order,
+        clearance_mm=clearance_mm,
+        max_overlap_mm=max_overlap_mm,
+    )
     return load_scenario(target)
 
 

@@ -80,12 +80,12 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
 
     def __post_init__(self) -> None:
         if self.noise_mm != () or self.noise_deg != ():
-            by_axis = [_several(values) or (1.0,) for values in (self.noise_mm, self.noise_deg)]
+            by_axis = [as_tuple(values) or (1.0,) for values in (self.noise_mm, self.noise_deg)]
             object.__setattr__(self, "noise_level", tuple(product(*by_axis)))
             object.__setattr__(self, "noise_mm", ())
             object.__setattr__(self, "noise_deg", ())
         for info in AXES:
-            given = _several(getattr(self, info.name))
+            given = as_tuple(getattr(self, info.name))
             entries = given if info.is_whole else map(_plain, given)
             values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
             require(
@@ -114,7 +114,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
         check_grip(any(map(probes, self.method)), *self.grasp)
 
 
-def _several(values: Any) -> tuple[Any, ...]:
+def as_tuple(values: Any) -> tuple[Any, ...]:
     """One value or several as a tuple: a text is one name."""
     return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
 

@@ -1,0 +1,34 @@
+"""A scenario file from parts at their final poses."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from apo_bench.importers.assembly.new_scenario import NewScenario
+from apo_bench.importers.assembly.posed import read_posed
+from apo_bench.importers.assembly.upright import new_upright_scenario
+from apo_bench.importers.assembly.writing import write_scenario
+
+
+def scenario_from_poses(
+    poses: Path,
+    parts: Sequence[str],
+    out: Path,
+    source: str,
+    *,
+    up: str | None,
+    fixed: Sequence[str],
+    order: Sequence[str],
+    clearance_mm: float,
+    max_overlap_mm: float,
+) -> NewScenario:
+    """Choose what the poses leave open, and write the scenario file.
+
+    Args:
+        poses: A file of `[[pose]]` entries.
+        parts: Part files; empty: as the poses name them.
+        source: What the poses come from, for the file.
+        up, fixed, order, clearance_mm, max_overlap_mm: As in `import_assembly`.
+    """
+    made = new_upright_scenario(read_posed(poses, list(parts)), up, tuple(fixed), clearance_mm, max_overlap_mm, order)
+    write_scenario(made, out, f"Assembly of {out.stem}", source)
+    return made
