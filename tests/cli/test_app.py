@@ -125,14 +125,10 @@ def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None
 def test_the_doctor_names_packages_and_missing_extras(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from importlib.metadata import version
-
     from apo_bench.cli import doctor
 
-    def find(package: str) -> str:
-        return "" if package == "viser" else version(package)
-
-    monkeypatch.setattr(doctor, "_find_version", find)
+    find_version = doctor._find_version
+    monkeypatch.setattr(doctor, "_find_version", lambda package: "" if package == "viser" else find_version(package))
     code, out, _ = run(capsys, "doctor")
     lines = {line.split("  ")[0]: " ".join(line.split()) for line in out.splitlines()}
     assert code == 0
