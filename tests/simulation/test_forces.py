@@ -1,13 +1,14 @@
 """The force that is reported is that of a sensor, not of a step of the simulation."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from apo_bench import Plan, Scene, build_scene, draw_layout, replay
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, LowPass
+from apo_bench.simulation.robot.forces import WRIST_S, LowPass
 
 
 @pytest.mark.parametrize("step_s", [0.001, 0.0005, 0.0001])
@@ -21,14 +22,13 @@ def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypat
     layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
     plan = Plan(tower.scenario.assembly, layout.start, layout.poses)
     single = [0.0]
-    net = ForceSensors.net
+    take_up = LowPass.__call__
 
-    def look(sensors: ForceSensors) -> list[float]:
-        force = net(sensors)
+    def look(low_pass: LowPass, force: Sequence[float], seconds: float) -> list[float]:
         single[0] = max(single[0], math.hypot(*force))
-        return force
+        return take_up(low_pass, force, seconds)
 
-    monkeypatch.setattr(ForceSensors, "net", look)
+    monkeypatch.setattr(LowPass, "__call__", look)
     peaks = []
     singles = []
     for scene in (tower, build_scene(tower.scenario, timestep_s=0.0005)):

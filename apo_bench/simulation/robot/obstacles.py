@@ -126,10 +126,9 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
             look = may[:, i] & ~near
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
-                near[look] = (
-                    intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
-                    > -margin
-                )
+                T = obstacles[i].T
+                depths = intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, T, margin, margin)
+                near[look] = depths > -margin
     return near
 
 
