@@ -15,7 +15,7 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 @final
 @check_arguments
-class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
+class CorrectPoses(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
     """Correct the observed poses at every reset.
 
     The observation holds the corrected poses, with the directions that contacts leave free chosen as in trials. Zeros
@@ -39,7 +39,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         gymnasium.utils.RecordConstructorArgs.__init__(self, corrector=corrector)
         super().__init__(env)
         if not isinstance(env.unwrapped, APOReplay):
-            raise InputError(f"`Corrected` wraps an APOReplay environment, {env.unwrapped} was given.")
+            raise InputError(f"`CorrectPoses` wraps an APOReplay environment, {env.unwrapped} was given.")
         self._base: APOReplay = env.unwrapped
         self._corrector = resolve(corrector, {**CORRECTORS, **SIMULATED}, "corrector")
         if not callable(self._corrector):
