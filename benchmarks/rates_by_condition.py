@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from apo_bench.benchmark.analysis import Rate, wilson
+from apo_bench.benchmark.analysis import Rate, compute_wilson_interval
 from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_records
 
@@ -46,7 +46,7 @@ def fraction(rate: Rate | None) -> str:
 
 def widths(*trials: int) -> str:
     """Return how wide Wilson's 95 % intervals are at so many trials, in a sentence."""
-    at = (f"{n} of {n} is {100 * wilson(n, n).low:.0f} to 100 %" for n in trials)
+    at = (f"{n} of {n} is {100 * compute_wilson_interval(n, n).low:.0f} to 100 %" for n in trials)
     return f"Wilson's 95 % intervals: {', '.join(at)}."
 
 

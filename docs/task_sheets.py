@@ -8,9 +8,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.assembly import relation_graph
+from apo_bench.assembly import build_relation_graph
 from apo_bench.scenario import Scenario
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.viz.graph_picture import draw_graph
 from apo_bench.viz.task_sheet import task_sheet
 from benchmarks.baselines import difficulty, read_counts
@@ -60,10 +60,10 @@ def page(scenarios: Sequence[Scenario]) -> str:
 
 
 def main() -> None:
-    scenarios = [load_scenario(name) for name in scenario_names()]
+    scenarios = [load_scenario(name) for name in list_scenario_names()]
     PAGE.write_text(page(scenarios), encoding="utf-8")
     for scenario in scenarios:
-        graph = relation_graph(scenario.assembly)
+        graph = build_relation_graph(scenario.assembly)
         path = PAGE.parent / PICTURE.format(scenario.name)
         draw_graph(graph, path, f"{scenario.name} after operation {graph.step}", colors=scenario.colors)
 

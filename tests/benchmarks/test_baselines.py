@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from benchmarks.baselines import COLUMNS, Count, Place, count, difficulty, read_counts
 from benchmarks.provenance import share_of_sweep, trials_of
 
@@ -37,7 +37,7 @@ def test_nominal_poses_fail_in_eight_scenarios_and_snap_in_three_that_it_once_so
 
 def test_the_table_has_every_scenario_and_count() -> None:
     counts = read_counts()
-    assert set(scenario_names()) == {place.scenario for place in counts}
+    assert set(list_scenario_names()) == {place.scenario for place in counts}
     head, _, row = difficulty([load_scenario("peg_in_hole")], counts).splitlines()
     assert head.count("|") == row.count("|") == 2 + len(COLUMNS)
     assert [cell.strip() for cell in row.split("|")[2:-1]] == [

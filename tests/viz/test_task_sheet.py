@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import load_scenario
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from apo_bench.viz.task_sheet import task_sheet
 from docs.task_sheets import page
 
@@ -67,5 +67,5 @@ def test_every_scenario_says_all_of_it(name: str) -> None:
 
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
-    scenarios = [load_scenario(name) for name in scenario_names()]
+    scenarios = [load_scenario(name) for name in list_scenario_names()]
     assert PAGE.read_text(encoding="utf-8") == page(scenarios), "run: python docs/task_sheets.py"

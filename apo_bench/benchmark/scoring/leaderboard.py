@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.report.tables.table import Column, Table
+from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.benchmark.scoring.entry import Entry, TrackScore, read_entry
 from apo_bench.benchmark.scoring.track import read_track, track_names
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, default_looks, grouped, save_figure, write_file
+from apo_bench.io import check_target, group_by, save_figure, use_figure_style, write_file
 
 _STATUS = (
     "A `self-reported` entry is unverified, since anyone can draw public seeds again. The author of this table ran "
@@ -112,11 +112,11 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            Column("place", "#"),
-            Column("name", "entry", "entry.name", words=True),
-            Column("score", "score", lambda line: _overall(line.entry)),
-            Column("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
-            Column("status", "status", words=True),
+            TableColumn("place", "#"),
+            TableColumn("name", "entry", "entry.name", words=True),
+            TableColumn("score", "score", lambda line: _overall(line.entry)),
+            TableColumn("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
+            TableColumn("status", "status", words=True),
         ),
     )
 
@@ -128,7 +128,7 @@ def _version(track: TrackScore) -> tuple[str, bool]:
 
 def _used_versions(entries: Sequence[Entry]) -> dict[str, tuple[str, bool]]:
     """The version of each track that most entries have; of equally many that of the package, else the first."""
-    stated = grouped((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
+    stated = group_by((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
     for name in set(stated) & set(track_names()):
         own = read_track(name)
         stated[name].sort(key=lambda version: version != (own.hash, own.overall))
@@ -142,14 +142,14 @@ def _tracks(entries: Sequence[Entry]) -> list[str]:
 
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
-    entry = Column("name", "entry", "entry.name", words=True)
-    rates = (entry, *(Column(name, name, partial(_score_words, name)) for name in tracks))
-    brier = (entry, *(Column(name, name, partial(_brier, name)) for name in tracks))
-    trials = Column("trials", "trials", lambda line: sum(track.trials for track in line.entry.tracks.values()))
-    runs = (entry, trials, Column("command", "command", "entry.command", words=True))
-    same = grouped((_machine_text(line.entry), line.entry.name) for line in lines)
-    machine = Column("machine", "versions and machine", lambda group: group[0], words=True)
-    machines = (Column("entries", "entries", lambda group: ", ".join(group[1]), words=True), machine)
+    entry = TableColumn("name", "entry", "entry.name", words=True)
+    rates = (entry, *(TableColumn(name, name, partial(_score_words, name)) for name in tracks))
+    brier = (entry, *(TableColumn(name, name, partial(_brier, name)) for name in tracks))
+    trials = TableColumn("trials", "trials", lambda line: sum(track.trials for track in line.entry.tracks.values()))
+    runs = (entry, trials, TableColumn("command", "command", "entry.command", words=True))
+    same = group_by((_machine_text(line.entry), line.entry.name) for line in lines)
+    machine = TableColumn("machine", "versions and machine", lambda group: group[0], words=True)
+    machines = (TableColumn("entries", "entries", lambda group: ", ".join(group[1]), words=True), machine)
     yield from ("# Leaderboard", "", f"{len(lines)} entries, the best first.", "")
     yield from leaderboard_table(lines).markdown()
     yield from ("", _STATUS, "", f"![Scores of entries in tracks]({picture})", "", "## Tracks", "", _RATES, "")
@@ -164,7 +164,7 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
     """A square for every entry and track, darker where more trials succeeded, with its number."""
-    with default_looks({"font.size": 9.0}), warnings.catch_warnings():
+    with use_figure_style({"font.size": 9.0}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
         from matplotlib.figure import Figure
 
