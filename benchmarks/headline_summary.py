@@ -80,16 +80,16 @@ def sentence(summary: Summary) -> str:
         _percent(pool(summary.cells, method, NOISE)) for method in ("uncorrected", "spiral-search", summary.corrected)
     )
     result = (
-        f"With pose noise of {NOISE:g} mm, {NOISE:g} degree (1 sigma per axis) the replay of the observed poses succeeds "
-        f"in **{observed}** of the trials, with a spiral search in **{searched}**. Corrected by face contacts it "
-        f"succeeds in **{corrected}**."
+        f"With pose noise of {NOISE:g} mm, {NOISE:g} degree (1 sigma per axis) the replay of the observed poses "
+        f"succeeds in **{observed}** of the trials, with a spiral search in **{searched}**. Corrected by face contacts "
+        f"it succeeds in **{corrected}**."
     )
     limits = []
     measured = pool(summary.cells, summary.corrected, NOISE, noise=MEASURED)
     if measured:
         limits.append(
-            f"**{_percent(measured)}** with a pose estimator that misses a quarter of the parts and has gross errors in "
-            "a quarter of the others"
+            f"**{_percent(measured)}** with a pose estimator that misses a quarter of the parts and has gross errors "
+            "in a quarter of the others"
         )
     robot, both = (robot_rate(summary, f"{summary.corrected}{more}", ROBOT_ERROR) for more in ("", "+spiral"))
     if robot:

@@ -30,7 +30,7 @@ class RateTable:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One dict for each condition: its settings, `trials`, `successes`, `rate`, `low_95`, `high_95` (from 0 to 1)."""
+        """One dict for each condition: its settings, `trials`, `successes`, `rate`, `low_95`, `high_95` (0 to 1)."""
         table = self._table()
         named = [column for column in table.columns if column.name]
         return [{column.name: column.of(item) for column in named} for item in table.items]

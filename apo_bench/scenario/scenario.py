@@ -115,7 +115,7 @@ class HumanError:
 @copyable
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A task of n operations: parts, contacts, nominal poses, and how layout and human vary. `load_scenario` reads it."""
+    """A task of n operations: parts, contacts, nominal poses, and how layout and human vary."""
 
     name: str
     """Short name, or that of the file."""

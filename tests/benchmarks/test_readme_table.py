@@ -12,7 +12,13 @@ def test_the_readme_has_the_table_of_the_committed_counts() -> None:
 
 
 def test_rates_are_pooled_over_scenarios_at_one_level_without_human_error() -> None:
-    shown = {"method": "contact", "noise": "isotropic", "robot_error": "none", "noise_mm": "1", "human_error_scale": "0"}
+    shown = {
+        "method": "contact",
+        "noise": "isotropic",
+        "robot_error": "none",
+        "noise_mm": "1",
+        "human_error_scale": "0",
+    }
     lines = [
         {**shown, "successes": "3", "trials": "5"},
         {**shown, "successes": "4", "trials": "5"},
