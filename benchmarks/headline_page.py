@@ -27,8 +27,8 @@ OUTLIERS = (
 )
 ROBOT = (
     f"Noise of {NOISE:g} mm and degree, no human error. Every trial draws a [robot "
-    "error](../guide/arm.md#errors-of-the-robot), in standard deviations, mm and degrees. Contacts correct the errors "
-    "of the camera, not those of the robot: `oracle`, which has the true poses, fails as well."
+    "error](../guide/robot-error.md#errors-of-the-robot), in standard deviations, mm and degrees. Contacts correct the "
+    "errors of the camera, not those of the robot: `oracle`, which has the true poses, fails as well."
 )
 OLDER = " **`benchmarks/headline.toml` has changed since.**"
 Words = Callable[[ConditionResult], tuple[str, ...]]

@@ -30,9 +30,9 @@ MEASURED = """
 
 Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it.
 Success: the finished assembly is right; the same seeds, no human error, clearance of 0.25 mm per side, and noise of
-1 mm and 1 degree (1 sigma per axis) for all methods but `oracle`. Every trial draws a [robot
-error](../guide/arm.md#errors-of-the-robot), in standard deviations, mm and degrees. The sweeps ran with {} revision(s)
-of the package.
+1 mm and 1 degree (1 sigma per axis) for all methods but `oracle`. Every trial draws a
+[robot error](../guide/robot-error.md#errors-of-the-robot), in standard deviations, mm and degrees. The sweeps ran
+with {} revision(s) of the package.
 """
 SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
 USUAL = {"arm": "six_axis", "ft_sensor": TrialConfig.ft_sensor, "assumed_robot_error": TrialConfig.assumed_robot_error}

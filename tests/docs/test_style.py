@@ -55,9 +55,8 @@ def messages() -> Iterator[tuple[str, str]]:
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    for folder in ("how", "reference", "results"):
-        for path in sorted((DOCS / folder).glob("*.md")):
-            yield f"{folder}/{path.name}", path.read_text(encoding="utf-8")
+    for path in (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))):
+        yield str(path.relative_to(DOCS.parent)), path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("texts", [help_texts, public_docstrings, messages, pages])
