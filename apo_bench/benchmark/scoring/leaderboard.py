@@ -19,8 +19,8 @@ from apo_bench.io import check_target, default_looks, grouped, save_figure, writ
 _PROVES = (
     "`self-reported` proves nothing: anyone with the package can draw public seeds again. The author of this table ran "
     "`verified` entries with trials of a secret seed, whose hash was published before; entrants that are not trusted "
-    "ran as programs, which get observations and nothing else. Entries marked `quick` ran a few trials, which are no "
-    "score."
+    "ran as programs, which get observations and nothing else. `real` entries are forms of trials with a real robot. "
+    "Entries marked `quick` ran a few trials, which are no score."
 )
 _EVERY = (
     "Success rate in percent, mean over the conditions of a track, with its 95 % interval over seeds; in brackets the "
@@ -40,7 +40,8 @@ class Line(NamedTuple):
 
     @property
     def status(self) -> str:
-        return ("verified" if self.verified else "self-reported") + ", quick" * self.entry.quick
+        status = "verified" if self.verified else "self-reported"
+        return "real, " * self.entry.real + status + ", quick" * self.entry.quick
 
 
 class Run(NamedTuple):
