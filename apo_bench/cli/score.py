@@ -61,7 +61,6 @@ def score_command(
 
     Examples:
       apo-bench score contact --out entries/contact.json
-      apo-bench score mine:correct --track given --quick --out entry.json
       apo-bench score contact --results form.csv --out real.json
     """
     from apo_bench.benchmark.scoring.entry import check_name, read_entry, write_entry
