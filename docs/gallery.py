@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from apo_bench.assembly import Assembly
-from apo_bench.formats.kit import part_mesh
-from apo_bench.geometry import Array, Solid, physical_pieces, union_mesh
+from apo_bench.formats.kit import make_part_mesh
+from apo_bench.geometry import Array, Solid, build_union_mesh, shrink_pieces
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene.render import aim_camera
 from apo_bench.simulation.scene.scene import build_scene
@@ -38,7 +38,7 @@ STEEL = (0.55, 0.57, 0.60)  # of parts without a colour
 
 
 def main() -> None:
-    names = scenario_names()
+    names = list_scenario_names()
     figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.2), layout="constrained")
     for axis in axes.flat:
         axis.axis("off")
@@ -83,8 +83,10 @@ def assembled(assembly: Assembly) -> set[str]:
 
 def add_part(spec: Any, part: str, solid: Solid, scenario: Scenario, T: Array) -> None:
     """Add a part as a mesh without smoothed edges."""
-    pieces = physical_pieces(solid, 1e-3 * scenario.clearance_mm)
-    shape = part_mesh(solid, scenario.clearance_mm).apply_scale(1e-3) if part == "table" else union_mesh(pieces)
+    mm = scenario.clearance_mm
+    shape = (
+        make_part_mesh(solid, scenario.clearance_mm).apply_scale(1e-3) if part == "table" else build_union_mesh(pieces)
+    )
     mesh = spec.add_mesh(name=part, uservert=shape.triangles.ravel(), userface=np.arange(3 * len(shape.triangles)))
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     color = scenario.colors.get(part, TABLE if part == "table" else STEEL)

@@ -10,12 +10,12 @@ from apo_bench.cli.shared import (
     AsJson,
     Command,
     ScenarioArgument,
-    group,
-    path_argument,
-    path_option,
+    make_group,
+    make_path_argument,
+    make_path_option,
+    name_write_errors,
     print_json,
     say,
-    writing,
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
@@ -28,13 +28,13 @@ Examples:
   apo-bench part import bracket.step --out parts
   apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
 """
-commands = group("part", _HELP)
+commands = make_group("part", _HELP)
 
 
 @commands.command("import", cls=Command)
 def part_import(
-    file: Annotated[Path, path_argument("FILE", "A CAD file: .step, .stp, .stl, .obj or .3mf.")],
-    out: Annotated[Path, path_option("Folder of the part files and their pictures.")],
+    file: Annotated[Path, make_path_argument("FILE", "A CAD file: .step, .stp, .stl, .obj or .3mf.")],
+    out: Annotated[Path, make_path_option("Folder of the part files and their pictures.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the file: mm, in, m, cm, ft or um; default: as the file states.")
     ] = None,
@@ -62,7 +62,7 @@ def part_import(
         not names or len(solids) <= 1,
         f"--name renames the faces of one solid, and {file} holds {len(solids)}; import each from its own file.",
     )
-    with writing(f"--out {out}"):
+    with name_write_errors(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("\n".join(file_lines(source, file)), as_json)
         imported, refused = _import_solids(file, [rename_faces(raw, names) for raw in solids], out, density, as_json)
@@ -79,7 +79,7 @@ def part_import(
 @commands.command("export", cls=Command)
 def part_export(
     scenario: ScenarioArgument,
-    out: Annotated[Path, path_option("Folder of the kit.")],
+    out: Annotated[Path, make_path_option("Folder of the kit.")],
     clearance_mm: Annotated[
         float | None,
         typer.Option(min=0.0, max=5.0, help="Clearance of your printer, per side, in mm; default: as the scenario."),
@@ -99,7 +99,7 @@ def part_export(
 
     task = load_scenario(scenario)
     clearance = task.clearance_mm if clearance_mm is None else clearance_mm
-    with writing(f"--out {out}"):
+    with name_write_errors(f"--out {out}"):
         files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], trials, step)
     for file, count in files.items():
         typer.echo(f"{file}: print {count}")
@@ -110,19 +110,19 @@ def _import_solids(
     file: Path, solids: Sequence[Any], out: Path, density: float, as_json: bool
 ) -> tuple[list[Any], list[str]]:
     """Parts with their pictures, and the reasons why other solids became none."""
-    from apo_bench.importers.cad.importing import import_part
+    from apo_bench.importers.cad.importing import import_solid
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import part_lines, report_part
-    from apo_bench.importers.cad.solids.naming import clean_title, part_name
+    from apo_bench.importers.cad.solids.naming import clean_title, make_part_name
 
     imported: list[Any] = []
     refused: list[str] = []
     used: set[str] = set()
     for raw in solids:
-        stem = part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
+        stem = make_part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
         used.add(stem)
         try:
-            part = import_part(raw, stem, out, file.name, density)
+            part = import_solid(raw, stem, out, file.name, density)
         except InputError as error:
             if len(solids) == 1:
                 raise

@@ -16,7 +16,7 @@ from apo_bench.cli.shared import (
     Workers,
     check_output,
     count_cores,
-    path_option,
+    make_path_option,
     print_json,
     print_table,
     say,
@@ -35,21 +35,26 @@ def score_command(
     track: Annotated[
         list[str] | None, typer.Option(help="Track by name or file; may be repeated; default: all tracks.")
     ] = None,
-    out: Annotated[Path | None, path_option("Write the entry: .json; its records are in a folder next to it.")] = None,
+    out: Annotated[
+        Path | None, make_path_option("Write the entry: .json; its records are in a folder next to it.")
+    ] = None,
     command: Annotated[
         str | None,
         typer.Option(metavar="PROGRAM", help="Program that reads a request, one line of JSON, and answers."),
     ] = None,
     estimator: Annotated[
         Path | None,
-        path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
+        make_path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
     ] = None,
     results: Annotated[
-        Path | None, path_option("Form of `part export`, filled in with trials of a real robot; nothing is simulated.")
+        Path | None,
+        make_path_option("Form of `part export`, filled in: trials of a real robot; nothing is simulated."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a few seeds of each condition, as a test.")] = False,
-    secret_seed_file: Annotated[Path | None, path_option("Draw trials that nobody can draw without this file.")] = None,
+    secret_seed_file: Annotated[
+        Path | None, make_path_option("Draw trials that nobody can draw without this file.")
+    ] = None,
     workers: Workers = None,
     backend: Backend = "local",
     address: Address = None,
@@ -65,7 +70,7 @@ def score_command(
     """
     from apo_bench.benchmark.scoring.entry import check_name, read_entry, write_entry
     from apo_bench.benchmark.scoring.program import program_method
-    from apo_bench.benchmark.scoring.real_form import real_entry
+    from apo_bench.benchmark.scoring.real_form import read_real_entry
     from apo_bench.benchmark.scoring.score import score
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
 
@@ -92,7 +97,7 @@ def score_command(
     line = shlex.join(["apo-bench", *sys.argv[1:]])
     if results is not None:
         require(method is not None, "--results needs METHOD, as the form names it.")
-        entry = real_entry(results, str(method), name, line)
+        entry = read_real_entry(results, str(method), name, line)
     else:
         with program_method(command, records) if command else nullcontext(str(method)) as found:
             entry = score(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Solid, physical_pieces
+from apo_bench.geometry import Solid, shrink_pieces
 from apo_bench.io import write_csv, write_file
 from apo_bench.scenario import Scenario
 
@@ -53,9 +53,9 @@ def write_kit(
     assembly = scenario.assembly
     printed = Counter(scenario.part_files[part].stem for part in assembly.solids if part != "table")
     solids = {scenario.part_files[part].stem: solid for part, solid in assembly.solids.items()}
-    meshes = {name: part_mesh(solids[name], clearance_mm) for name in printed}
+    meshes = {name: make_part_mesh(solids[name], clearance_mm) for name in printed}
     if "table" in assembly.solids:
-        meshes["plate"] = plate_mesh(scenario, clearance_mm)
+        meshes["plate"] = make_plate_mesh(scenario, clearance_mm)
         printed["plate"] = 1
     folder.mkdir(parents=True, exist_ok=True)
     files = {}
@@ -71,7 +71,7 @@ def write_kit(
     return files
 
 
-def part_mesh(solid: Solid, clearance_mm: float) -> Any:
+def make_part_mesh(solid: Solid, clearance_mm: float) -> Any:
     """Return a part as it is printed, a closed mesh of trimesh [mm]; round faces have flat sides.
 
     Raises:
@@ -81,7 +81,7 @@ def part_mesh(solid: Solid, clearance_mm: float) -> Any:
     from manifold3d import Manifold, OpType
 
     # neighbours become one body only where their corners are the same to the last bit
-    corners = [np.round(_MM * piece.corners, _DECIMALS) for piece in physical_pieces(solid, clearance_mm / _MM)]
+    corners = [np.round(_MM * piece.corners, _DECIMALS) for piece in shrink_pieces(solid, clearance_mm / _MM)]
     mesh = Manifold.batch_boolean([Manifold.hull_points(each) for each in corners], OpType.Add).to_mesh64()
     printable = trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts)
     require(
@@ -92,7 +92,7 @@ def part_mesh(solid: Solid, clearance_mm: float) -> Any:
     return printable
 
 
-def plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
+def make_plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
     """Return the middle of the table with four recesses for tags, a mesh [mm], z = 0 on top.
 
     Its middle is where the last operation puts its part in the frame of the assembly, which is the frame of the plate.
@@ -101,7 +101,7 @@ def plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
     from trimesh.creation import box
 
     middle = np.append(_MM * scenario.goals[-1][:2, 3], 0.0)
-    table = part_mesh(scenario.assembly.solids["table"], clearance_mm).apply_translation(-middle)
+    table = make_part_mesh(scenario.assembly.solids["table"], clearance_mm).apply_translation(-middle)
     plate = box(bounds=((-_PLATE_MM / 2, -_PLATE_MM / 2, -_PLATE_THICK_MM), (_PLATE_MM / 2, _PLATE_MM / 2, 0.0)))
     papers = [
         box((_TAG_PAPER_MM, _TAG_PAPER_MM, 2 * _RECESS_MM)).apply_translation((x, y, 0)) for *_, x, y, _ in _tags()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
-from apo_bench.formats.kit import FORM_COLUMNS, TAG_EDGE_MM, part_mesh, plate_mesh, write_kit
+from apo_bench.formats.kit import FORM_COLUMNS, TAG_EDGE_MM, make_part_mesh, make_plate_mesh, write_kit
 from apo_bench.geometry import Solid
 from apo_bench.importers.cad.importing import raw_solids
 from apo_bench.io import read_csv
@@ -42,9 +42,9 @@ def test_what_is_printed_imports_again_with_the_same_faces(tmp_path: Path, suffi
 
 def test_fit_faces_recede_by_the_clearance_and_the_plate_keeps_the_pockets_of_its_table() -> None:
     scenario = load_scenario("pocket_table")
-    stick = part_mesh(scenario.assembly.solids["stick"], CLEARANCE_MM)
+    stick = make_part_mesh(scenario.assembly.solids["stick"], CLEARANCE_MM)
     assert np.allclose(stick.extents, (220.0, 20 - 2 * CLEARANCE_MM, 20 - 2 * CLEARANCE_MM))
-    plate = plate_mesh(scenario, CLEARANCE_MM)
+    plate = make_plate_mesh(scenario, CLEARANCE_MM)
     tags_and_pockets = 4 * 38**2 * 0.4 + 2 * (50 + 2 * CLEARANCE_MM) ** 2 * 6
     assert plate.volume == pytest.approx(200 * 200 * 10 - tags_and_pockets, rel=1e-6)
 
@@ -52,7 +52,7 @@ def test_fit_faces_recede_by_the_clearance_and_the_plate_keeps_the_pockets_of_it
 def test_a_part_that_makes_no_closed_solid_is_refused() -> None:
     roof = load_scenario("wedge_under_roof").assembly.solids
     with pytest.raises(InputError, match="'lean_to' is not one closed solid at a clearance of"):
-        part_mesh(roof["roof"], CLEARANCE_MM)
+        make_part_mesh(roof["roof"], CLEARANCE_MM)
 
 
 def test_the_form_has_a_line_for_each_method_of_each_trial_and_tags_their_places(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ _MEASURED = ("fit_gap_mm", "support_gap_mm", "overlap_percent", "slid_mm")
 
 
 @check_arguments
-def real_entry(form: str | Path, method: str, name: str | None = None, command: str = "") -> Entry:
+def read_real_entry(form: str | Path, method: str, name: str | None = None, command: str = "") -> Entry:
     """Read the trials of a method from a filled-in form.
 
     Args:

@@ -9,7 +9,7 @@ import pytest
 from apo_bench import InputError, load_scenario
 from apo_bench.benchmark.scoring.entry import read_entry, write_entry
 from apo_bench.benchmark.scoring.leaderboard import ranked
-from apo_bench.benchmark.scoring.real_form import real_entry
+from apo_bench.benchmark.scoring.real_form import read_real_entry
 from apo_bench.cli.app import main
 from apo_bench.formats.kit import write_kit
 
@@ -38,7 +38,7 @@ def filled(folder: Path, cells: list[str]) -> Path:
 
 
 def test_the_form_makes_an_entry_that_the_judge_would_make(tmp_path: Path) -> None:
-    entry = real_entry(filled(tmp_path, list(LETTERS)), "contact", name="our lab")
+    entry = read_real_entry(filled(tmp_path, list(LETTERS)), "contact", name="our lab")
     assert list(entry.tracks["real-stick_in_tower"].cells.values()) == ["".join(LETTERS.values())]
     assert entry.tracks["real-stick_in_tower"].trials == len(LETTERS) - 1
     assert entry.overall is None
@@ -64,9 +64,9 @@ def test_the_command_writes_the_entry(tmp_path: Path, capsys: pytest.CaptureFixt
 )
 def test_a_cell_that_is_wrong_is_named(tmp_path: Path, cells: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        real_entry(filled(tmp_path, [cells]), "contact")
+        read_real_entry(filled(tmp_path, [cells]), "contact")
 
 
 def test_a_method_without_a_line_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no line has the method 'snap'"):
-        real_entry(filled(tmp_path, []), "snap")
+        read_real_entry(filled(tmp_path, []), "snap")
