@@ -83,10 +83,10 @@ def assembled(assembly: Assembly) -> set[str]:
 
 def add_part(spec: Any, part: str, solid: Solid, scenario: Scenario, T: Array) -> None:
     """Add a part as a mesh without smoothed edges."""
-    mm = scenario.clearance_mm
-    shape = (
-        make_part_mesh(solid, scenario.clearance_mm).apply_scale(1e-3) if part == "table" else build_union_mesh(pieces)
-    )
+    if part == "table":  # its pieces have faces in one plane
+        shape = make_part_mesh(solid, scenario.clearance_mm).apply_scale(1e-3)
+    else:
+        shape = build_union_mesh(shrink_pieces(solid, 1e-3 * scenario.clearance_mm))
     mesh = spec.add_mesh(name=part, uservert=shape.triangles.ravel(), userface=np.arange(3 * len(shape.triangles)))
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     color = scenario.colors.get(part, TABLE if part == "table" else STEEL)
