@@ -7,8 +7,8 @@ set explains the observation better than chance by
 
     log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
 
-twice the logarithm of a Bayes factor (of Savage and Dickey; the range is so wide that only its size counts). An equation
-that others imply adds as much to one determinant as to the other, so it gains nothing, as it should.
+twice the logarithm of a Bayes factor (of Savage and Dickey; the range is so wide that its size alone counts). Equations
+that others imply add equally to both determinants, so they gain nothing, as they should.
 """
 
 from dataclasses import dataclass

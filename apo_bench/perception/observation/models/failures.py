@@ -134,7 +134,7 @@ def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
 
 
 def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are observed turned by one of their approximate symmetries, T F; one that has none is observed correctly."""
+    """Parts are observed turned by an approximate symmetry, T F; a part without one is observed correctly."""
     assembly = shown.assembly
     for k in draw_failing(len(poses), rate, rng):
         turns = find_approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
