@@ -14,7 +14,6 @@ from pyarrow import parquet
 
 from apo_bench import InputError, TrialConfig
 from apo_bench.benchmark.datasets.making import make_dataset
-from apo_bench.benchmark.datasets.minari import write_minari
 
 REPLAYED = [
     TrialConfig(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
@@ -71,14 +70,6 @@ def test_lerobot_finds_every_frame_where_its_table_of_episodes_says(lerobot: dic
             np.testing.assert_allclose(episode[f"stats/{name}/mean"], x.mean(axis=0), rtol=1e-4, atol=1e-6)
             np.testing.assert_allclose(episode[f"stats/{name}/q99"], np.quantile(x, 0.99, axis=0), rtol=1e-5, atol=1e-6)
     assert parquet.ParquetFile(root / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 2
-
-
-def test_policies_of_lerobot_see_what_is_felt(lerobot: dict[str, Path]) -> None:
-    """They look at `environment_state`, never at a wrench."""
-    frames = columns(parquet.read_table(lerobot["insertions"] / "data"))
-    both = np.hstack([frames["observation.plan"], frames["observation.wrench"]])
-    np.testing.assert_array_equal(frames["observation.environment_state"], both)
-    assert np.abs(frames["observation.wrench"]).max() > 0.1
 
 
 def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobot: dict[str, Path]) -> None:
@@ -142,28 +133,6 @@ def test_every_episode_is_the_same_bit_for_bit_when_it_is_made_again(
     assert len(files) >= 3
     for path in files:
         assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes(), path
-
-
-def test_the_card_names_every_field(lerobot: dict[str, Path]) -> None:
-    for root in lerobot.values():
-        card = (root / "README.md").read_text()
-        info = json.loads((root / "meta" / "info.json").read_text())
-        assert all(f"| `{name}` |" in card for name in info["features"])
-        assert card.startswith("---\nlicense: apache-2.0\n")
-
-
-def test_trials_in_which_nothing_moves_are_left_out_and_said(tmp_path: Path) -> None:
-    trials = [TrialConfig("block_on_block", method="paper", noise_mm=40, noise_deg=40, seed=k) for k in range(3)]
-    said: list[str] = []
-    made, _ = make_dataset(trials, tmp_path / "data", "by hand", "lerobot", say=said.append)
-    assert made + len(said) == 3
-    assert all("is left out, as nothing moved: " in each for each in said)
-
-
-def test_without_h5py_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(InputError, match="needs the package h5py; install it with"):
-        write_minari([], None, tmp_path)  # type: ignore[arg-type]
 
 
 def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(
