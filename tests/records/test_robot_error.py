@@ -6,7 +6,6 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_robot_error, robot_sigmas
-from apo_bench.records.robot_error import Sigmas
 
 
 @pytest.mark.parametrize(
@@ -23,21 +22,14 @@ def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) 
     assert robot_sigmas(given) == robot_sigmas(spelled)
 
 
-def test_numbers_are_those_of_their_kinds() -> None:
-    asked = "hand_eye:1/0.2+joints:0.05+tool:0.5+in_hand:0.3/2"
-    assert robot_sigmas(asked) == Sigmas((1.0, 0.2), 0.05, 0.5, (0.3, 2.0))
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         ("elbow:1", "unknown kind of robot error 'elbow'. Known: hand_eye, in_hand, joints, none, tool."),
-        ("tool:1+tool:2", "the robot error 'tool:1+tool:2' was given, which has tool twice; state it once."),
         (
             "tool:1/2",
             "the robot error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5.",
         ),
-        ("hand_eye", "the robot error 'hand_eye' was given; standard deviations in mm and degrees from 0 to 20"),
     ],
 )
 def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
@@ -51,8 +43,6 @@ def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
     [
         ("matched", "matched", "tool:0.2"),
         ("unknown", "unknown", None),
-        ("none", "none", "none"),
-        ("tool:0", "none", "none"),
         ("tool:0.50+hand_eye:1.0/0", "hand_eye:1+tool:0.5", "hand_eye:1+tool:0.5"),
     ],
 )
@@ -61,9 +51,3 @@ def test_what_a_robot_is_told_is_what_is_drawn_nothing_or_something_else(
 ) -> None:
     assert checked_assumed_robot_error(given) == spelled == checked_assumed_robot_error(spelled)
     assert assumed_error(spelled, "tool:0.2") == told
-
-
-@pytest.mark.parametrize("given", ["matchd", "tool:1+elbow:2"])
-def test_another_assumed_error_is_refused(given: str) -> None:
-    with pytest.raises(InputError, match="assumed robot error"):
-        checked_assumed_robot_error(given)
