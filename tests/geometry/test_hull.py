@@ -8,21 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import (
-    SAGITTA_M,
-    Box,
-    Cylinder,
-    Hull,
-    Posed,
-    RoundFace,
-    Solid,
-    cylinder_hull,
-    extent,
-    intrusion_depths,
-    physical_pieces,
-    separating_axes,
-    sides_of,
-)
+from apo_bench.geometry import Box, Hull, Posed, RoundFace, Solid, intrusion_depths, physical_pieces, separating_axes
 from tests.geometry.overlaps import overlap_intervals
 
 
@@ -57,15 +43,6 @@ def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
     spans = overlap_intervals(Posed((a,), T_a), way, Posed((b,), T_b))
     same = overlap_intervals(Posed((as_hull(a),), T_a), way, Posed((as_hull(b),), T_b))
     assert same == pytest.approx(spans, abs=1e-9)
-
-
-def test_a_cylinder_is_as_wide_as_its_sagitta_allows():
-    hull = cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.02))
-    assert len(hull.corners) == 2 * sides_of(0.005)
-    for angle in np.linspace(0.0, 6.0, 50):
-        low, high = extent((hull,), np.array([np.cos(angle), np.sin(angle), 0.0]))
-        assert 0.005 - SAGITTA_M <= high <= 0.005 + 1e-12
-        assert -0.005 - 1e-12 <= low <= -0.005 + SAGITTA_M
 
 
 def wedges(radius: float, n: int) -> tuple[Hull, ...]:
