@@ -30,9 +30,7 @@ BREACHES = {
         ("apo_bench.scenario.parts.load", "apo_bench.scenario.file"),
         ("apo_bench.scenario.generated.families", "apo_bench.scenario.layout"),
     ],
-    "planning": [
-        ("apo_bench.planning.insertion.arrival", "apo_bench.planning.prediction.failure"),
-    ],
+    "planning": [("apo_bench.planning.insertion.arrival", "apo_bench.planning.prediction.failure")],
     "perception": [
         ("apo_bench.perception.observation.noise", "apo_bench.perception.detection.contacts"),
         ("apo_bench.perception.detection.contacts", "apo_bench.perception.depth_camera.locate"),
