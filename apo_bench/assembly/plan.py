@@ -26,17 +26,19 @@ class Step(NamedTuple):
 @copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What the robot is asked to do."""
+    """The target poses of n operations, and the order in which the robot does and undoes them."""
 
     assembly: Assembly
+    """Solids, operations and contacts, without poses."""
     start: Poses
+    """Part -> its pose before the first operation, (4, 4), world frame, [m]."""
     target_poses: Array
-    """(n, 4, 4): where every operation puts its main part in the end."""
+    """(n, 4, 4): the final pose of the main part of each operation, world frame, [m]."""
     schedule: tuple[Step, ...] = field(default=())
-    """Empty stands for: every operation once, in order."""
+    """Operations to do or undo, in order. Default: every operation once."""
     step_poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
-    """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
-    that it undoes. Empty stands for: those of `target_poses`."""
+    """(steps, 4, 4): the target of each step of the schedule, world frame, [m]; of an undo step, the target that it
+    undoes. Default: those of `target_poses`."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
@@ -50,7 +52,7 @@ class Plan:
 
     @check_arguments
     def with_target_poses(self, poses: Array) -> "Plan":
-        """The plan with other target poses, (n, 4, 4), also in the steps that bring parts to the old ones."""
+        """Return the plan with other target poses, (n, 4, 4), world frame, [m]; steps to the old ones lead to them."""
         done = [step.operation for step in self.schedule]
         # step poses that are not target poses are states in between, which stay where they are
         final = (self.step_poses == self.target_poses[done]).all(axis=(1, 2))

@@ -98,17 +98,20 @@ class ProbingResult:
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class ReplayResult:
-    """One replay: what was reached and how it went."""
+    """What a replay reached, and how it ended."""
 
     reached: Reached
+    """The poses and states of the parts after each operation and at the end, for the judge."""
     outcome: Outcome
+    """Stage, code, operation and sentence of the end, as the robot knows it."""
     peak_force_n: float
     """Largest net contact force on a part that the robot held (the gripper's own forces excluded), behind a low-pass
     filter of 20 ms, [N]."""
     sim_time_s: float
+    """Simulated time, [s]."""
     timeline: tuple[tuple[Step, float], ...] = ()
-    """Each step that was finished, with the simulated time at which it was over, [s]."""
+    """Each finished step of the schedule with the simulated time of its end, [s]."""
     in_hand: tuple[InHand, ...] = ()
-    """Of each operation whose part was grasped; no controller reads it."""
+    """How far each grasped part slipped in the gripper; the controller does not know it."""
     probing: ProbingResult | None = None
-    """None of a robot that does not feel."""
+    """The estimate of the calibration error; None without probing."""

@@ -108,18 +108,29 @@ class Relation(NamedTuple):
 @copyable
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What is taken as certain: solids, operations, fixed parts. It never changes."""
+    """What is certain about a task: solids, operations and their contacts, fixed parts. It has no poses.
+
+    Examples:
+        >>> import apo_bench
+        >>> assembly = apo_bench.load_scenario("stick_in_tower").assembly
+        >>> len(assembly), [operation.main for operation in assembly.operations]
+        (3, ['castle1', 'castle2', 'stick'])
+        >>> print(assembly.operations[2].contacts[0])
+        stick.nz on castle1.sfl
+    """
 
     solids: Mapping[str, Solid]
+    """Part -> its nominal shape, part frame, [m]."""
     operations: tuple[Operation, ...]
+    """For each operation the part that moves, the contacts that it makes, and the parts that it carries."""
     fixed: frozenset[str]
-    """Stable objects (Section 2.3): parts that no operation moves, such as the table."""
+    """Parts that no operation moves, such as the table (stable objects, Section 2.3 of the paper)."""
     gaps: Mapping[Contact, Gap] = field(default_factory=dict)
-    """Contacts that are not simply asked to coincide."""
+    """Contact -> how far apart its faces are; a contact that is not named has faces that coincide."""
     sheets: Mapping[PartFace, Face] = field(default_factory=dict)
-    """Planes and points that stand for round faces, which no part has: `lowering` makes them."""
+    """Planes and points that stand for round faces in the contact equations."""
     origin: Mapping[Contact, Contact] = field(default_factory=dict)
-    """Contacts of sheets -> the contact of a round face that they are part of."""
+    """Contact of a sheet -> the contact of the round face that it stands for."""
 
     def __post_init__(self) -> None:
         freeze(self, solids=None, gaps=None, sheets=None, origin=None)

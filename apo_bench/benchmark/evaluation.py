@@ -44,11 +44,24 @@ def evaluate(
             scenario may be a `Scenario`, and `noise` a function.
 
     Returns:
-        A table with the success rate of each condition.
+        A table with the success rate and its 95 % interval in each condition.
 
     Raises:
         InputError: An unknown setting, a value that is not allowed, or a function with more than one worker that cannot
             be imported.
+
+    Examples:
+        >>> import apo_bench, numpy as np
+        >>> def replay_as_observed(observation):
+        ...     return np.array(observation.poses)  # (n, 4, 4), world frame, [m]
+        >>> table = apo_bench.evaluate(
+        ...     {"mine": replay_as_observed, "contact": "contact"},
+        ...     scenario="block_on_block",
+        ...     seeds=1,
+        ...     fidelity="near-contact",
+        ... )
+        >>> [(row["method"], row["trials"]) for row in table.rows]
+        [('contact', 1), ('mine', 1)]
     """
     for name in settings:
         require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))

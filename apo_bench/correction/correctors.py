@@ -26,17 +26,21 @@ class CorrectorMisbehaved(InputError):
 
 @check_arguments
 def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reobserver | None = None) -> Correction:
-    """Correct an observation.
+    """Correct the poses of an observation.
 
     Args:
-        corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
-            bare poses (n, 4, 4) in place of a `Correction` are measured and wrapped.
+        observation: From `observe` or `read_observation`.
+        corrector: A name (`apo-bench method list`), `"package.module:name"`, or a callable `Observation ->
+            Correction`; it may return bare poses (n, 4, 4), world frame, [m], which are wrapped.
         reobserve: Observes operations again. A corrector with a method `correct_and_reobserve` (`ReobservingCorrector`)
             gets it, and that method is called in place of the corrector; any other gets nothing.
 
+    Returns:
+        Poses, status and test; check `ok` before you execute them.
+
     Raises:
-        InputError: There is no such corrector, or the observation makes no sense.
-        CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
+        InputError: There is no such corrector, or the observation is inconsistent.
+        CorrectorMisbehaved: The corrector raised an error, or returned something else or an impossible schedule.
     """
     check_observation(observation)
     chosen = resolve_corrector(corrector)

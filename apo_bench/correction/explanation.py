@@ -122,12 +122,15 @@ class Explanation:
 
 @check_arguments
 def explain(observation: Observation, poses: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
-    """What the contacts determine at poses that satisfy them, and how uncertain these are after what was observed.
+    """Explain which directions the contacts determine, which stay free, and how uncertain each pose is.
 
     Args:
-        poses: (n, 4, 4), consistent with every contact, world frame, [m]; or a correction, which says in addition what
-            of the observation is assumed and which relations are not.
-        dropped: Relations, R1, R2, .., that are left out; so are inequalities, which leave a part free between them.
+        observation: The observation, whose covariance gives the uncertainty.
+        poses: (n, 4, 4), consistent with every contact, world frame, [m]; or a `Correction`.
+        dropped: Relations (R1, R2, ...) to leave out, as inequalities are.
+
+    Returns:
+        Free directions of every operation, and posterior standard deviations; `apo-bench inspect dof` prints it.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.

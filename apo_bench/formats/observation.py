@@ -35,12 +35,16 @@ def read_observation(
     """Read an observation from a `.csv` file, or from the JSON form of any other.
 
     Args:
-        scenario: The scenario it is of, its name, or its file.
+        path: A file with one pose per operation; `docs/guide/measured.md` describes its columns and keys.
+        scenario: The scenario of the poses, its name, or its file.
         deviation_mm: Standard deviation along each axis where the file states none.
         deviation_deg: Standard deviation about each axis where the file states none.
 
+    Returns:
+        The observation, for `correct`.
+
     Raises:
-        InputError: Anything that is not as described, with the place where it stands.
+        InputError: A fault of the file, with its line or key.
     """
     return read_observation_file(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
 

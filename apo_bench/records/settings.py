@@ -56,9 +56,14 @@ NOISE_LEVEL = SettingInfo(
 @final
 @dataclass(frozen=True)
 class TrialConfig:
-    """One trial: with the same version and the same files it determines its record.
+    """The settings of one trial; with the same version and files they determine its record.
 
-    A record has these settings as its first columns, in this order.
+    They are the first columns of a record, in this order.
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.TrialConfig("stick_in_tower", noise_mm=0.5, method="contact", seed=7).noise_deg
+        1.0
     """
 
     scenario: Name = field(metadata=about(key=True, axis=True))

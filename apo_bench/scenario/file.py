@@ -38,14 +38,19 @@ def is_named(given: str) -> bool:
 
 @check_arguments
 def load_scenario(given: str | Path | Scenario) -> Scenario:
-    """The scenario of a short name, `generated:SEED` or `generated:FAMILY:SEED`, of a TOML file anywhere, or the
-    object itself.
+    """Load a scenario.
 
-    Part files in it are short names, or paths relative to the scenario file. Of a name it is read once.
+    Args:
+        given: A short name (`apo-bench scenario list`), `generated:SEED`, `generated:FAMILY:SEED`, a TOML file, or a
+            `Scenario`, which is returned. Part files are short names, or paths relative to the scenario file.
 
     Raises:
-        InputError: No such scenario, or the file breaks a rule; one sentence with file, key, what was given, what is
-            allowed and what to do.
+        InputError: There is no such scenario, or the file breaks a rule; the sentence names file, key and remedy.
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.load_scenario("stick_in_tower").clearance_mm
+        0.25
     """
     if isinstance(given, Scenario):
         return given

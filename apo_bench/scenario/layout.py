@@ -13,14 +13,22 @@ from apo_bench.scenario.scenario import Scenario
 
 @check_arguments
 def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
-    """A consistent layout: every contact of the scenario stays closed.
+    """Draw the true poses of a trial; every contact of the scenario holds.
 
     Uniform draws in this order: x, y and yaw of the site, then one for each shift and one for each turn of the
-    scenario. Parts start where the scenario says, in the world; only fixed parts that follow the site move with it.
+    scenario. Only fixed parts that follow the site move with it; all others start as the scenario states.
 
     Args:
-        clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start
-            stands that much lower.
+        scenario: From `load_scenario`.
+        rng: The only source of chance.
+        clearance_mm: Clearance per side. Default: that of the scenario. A part that stands on a fit face at its start
+            stands lower by it.
+
+    Examples:
+        >>> import apo_bench, numpy as np
+        >>> scenario = apo_bench.load_scenario("stick_in_tower")
+        >>> apo_bench.draw_layout(scenario, np.random.default_rng(7)).poses.shape
+        (3, 4, 4)
     """
     site = scenario.site
     spans = [site.yaw_rad, *((shift.low_m, shift.high_m) for shift in scenario.shifts)]

@@ -70,12 +70,16 @@ class FittingPlan:
 
 @check_arguments
 def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
-    """Plan a correction, moved along free directions so that it fits.
+    """Plan the execution of a correction; free directions are chosen so that every motion fits and is in reach.
 
     Args:
-        observation: What the corrector was given.
-        where: The scene that the plan is to be carried out in. Of a scenario, which is compiled if need be, a plan that
-            is foretold to fit counts as in reach.
+        correction: From `correct`.
+        observation: The observation that was corrected.
+        where: The scene of the execution. For a scenario, which is compiled if needed, a plan that is predicted to fit
+            counts as in reach.
+
+    Returns:
+        The plan, its prediction of failure, and the moves along free directions.
 
     Raises:
         InputError: The correction did not converge.

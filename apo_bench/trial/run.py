@@ -96,17 +96,17 @@ def run_trial(
     cache: ReplayCache | None = None,
     **settings: Any,
 ) -> TrialRecord:
-    """Run one trial, for example `run_trial("stick_in_tower", method="contact", noise_level=1, seed=7)`.
+    """Run one trial from the demonstration to the verdict.
 
     Args:
         config: A configuration, or a scenario (name, path or object) whose settings are the keywords.
-        scene: Compiled for scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
+        scene: The scene of scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
         method: A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)`
             poses in the world frame, [m]. Default: that of the configuration.
         simulated: The demonstration of this seed and human error scale. Default: simulated here.
         content: From `content_hash`. Default: computed here.
-        watch: As `Callbacks`.
-        cache: As in `RunContext`.
+        watch: Called with the `mujoco.MjData` about every 20 ms of simulated time, such as a `Film`.
+        cache: States that replays of the scene share; it changes only the computing time.
         settings: Settings of `TrialConfig` and `noise_level`, with a scenario.
 
     Returns:

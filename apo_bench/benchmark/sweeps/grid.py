@@ -58,11 +58,17 @@ _Axes: Any = make_dataclass("_Axes", _axis_fields(), frozen=True)
 @final
 @dataclass(frozen=True)
 class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so that a new one is in sweeps as well
-    """The settings of a sweep; it runs every combination, with the same seeds in each.
+    """The settings of a sweep, which runs every combination with the same seeds.
 
     Every setting of `TrialConfig` is a keyword; it takes one value or several. Noise levels are numbers, or pairs of mm
     and degrees; `noise_mm` and `noise_deg` may be given in their place. Settings that do not affect a method, such as
     the noise of `oracle`, are recorded for it as their defaults, and such a trial runs once.
+
+    Examples:
+        >>> import apo_bench
+        >>> grid = apo_bench.SweepConfig("stick_in_tower", noise_level=[0.5, 1], method="contact", trials=10)
+        >>> grid.noise_level
+        (0.5, 1.0)
     """
 
     scenario: tuple[str, ...]
@@ -72,7 +78,9 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     noise: tuple[str, ...] = field(default=(), kw_only=True)
     """Default: `isotropic`; none with the pose source `depth-camera` alone."""
     noise_mm: tuple[float, ...] = field(default=(), kw_only=True)
+    """In place of `noise_level`: standard deviations of positions."""
     noise_deg: tuple[float, ...] = field(default=(), kw_only=True)
+    """In place of `noise_level`: standard deviations of rotation vectors."""
     trials: int = field(default=100, kw_only=True)
     """Trials of each combination."""
     seed: int = field(default=0, kw_only=True)

@@ -35,16 +35,21 @@ _BEGINNINGS = 12
 
 @check_arguments
 def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> DetectedContacts:
-    """Detect the face contacts of every operation; those of the observation itself are ignored.
+    """Detect the face contacts of every operation from the observed poses.
 
-    Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
-    contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
+    The contacts of the observation itself are ignored. Each operation is tested for contacts of the parts that it moves
+    with the parts that it does not move, so carried parts keep their contacts. Operations that were not observed, and
+    those that depend on them, make no contact.
 
     Args:
-        rules: `RULES_BY_NOISE` of `apo_bench.perception.detection.thresholds`, or your own.
+        observation: From `observe` or `read_observation`.
+        rules: Thresholds. Default: those that follow from the stated noise.
+
+    Returns:
+        The observation with the detected contacts, and the evidence for each.
 
     Raises:
-        InputError: Something else was given.
+        InputError: An argument has another type.
     """
     observation = without_contacts(observation)
     assembly = observation.assembly

@@ -31,16 +31,18 @@ def replay(
     parts_at: Poses | None = None,
     cache: ReplayCache | None = None,
 ) -> ReplayResult:
-    """Execute a plan by the robot of a scene.
+    """Execute a plan with the robot of a scene.
 
     Args:
+        plan: From `fit_plan`, `Correction.plan` or `Observation.plan`.
+        scene: From `build_scene`.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         config: How the robot executes it.
         parts_at: The true poses of the parts before the first operation, world frame, [m]; by default the plan's.
-        cache: What replays of this scene have in common; changes nothing but the time it takes.
+        cache: States that replays of this scene share; it changes only the computing time.
 
     Returns:
-        What the robot has reached, and how it ended.
+        The state that the robot reached, and how the replay ended; `judge` takes `reached`.
     """
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:

@@ -32,13 +32,15 @@ def demonstrate(
     rng: np.random.Generator,
     watch: Hooks | Callable[[Any], None] | None = None,
 ) -> Demonstration:
-    """Assemble by hand, with the human error of the scenario times `human_error`.
+    """Simulate the demonstration by a human, with the human error of the scenario times `human_error`.
 
     The operation that the scenario names has the error, and parts that are placed against its part follow it. At the
     last operation the other hand corrects all of them; these small motions show in `final`, not in `poses`, since these
     parts are not observed again.
 
     Args:
+        scene: From `build_scene`.
+        layout: From `draw_layout`.
         human_error: 0 is an ideal human, 1 the human error of the scenario, another number a multiple of it.
         rng: The same numbers are drawn whatever `human_error` is, so that errors of one seed differ in size only.
         watch: Called with the `MjData` at the start and every `period_s` of simulated time, an attribute of it, by

@@ -16,11 +16,11 @@ from apo_bench.simulation.scene.scene import build_scene
 def show_scenario(
     scenario: str | Path | Scenario, *, finished: bool = True, camera: SceneCamera = "close"
 ) -> NDArray[np.uint8]:
-    """An image of a scenario without the arm, (480, 640, 3).
+    """Return an image of a scenario without the arm, (480, 640, 3), uint8.
 
     Args:
         scenario: A name, the path of a scenario file, or the scenario itself.
-        finished: Whether the parts are assembled at their nominal poses; if not, they are at their starts.
+        finished: Show the parts assembled at their nominal poses; if false, at their starts.
         camera: As in `draw_picture`.
     """
     loaded = load_scenario(scenario)
