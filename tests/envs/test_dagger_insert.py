@@ -42,15 +42,6 @@ def test_in_a_mirror_it_does_the_same_in_the_mirror(signs: np.ndarray) -> None:
     assert np.abs(a[:6]).max() > 1e-3
 
 
-def test_what_it_says_is_an_action_across_that_leaves_the_way_and_the_hand_to_the_approach() -> None:
-    loud = {name: 10 * each for name, each in WEIGHTS.items()}
-    for weights in (WEIGHTS, loud):
-        said = DaggerInsert(weights)(None, sight())
-        assert said.shape == (7,)
-        assert np.abs(said).max() <= 1.0
-        assert said[2] == said[6] == 0.0
-
-
 def test_it_goes_to_the_mean_place_that_the_network_said() -> None:
     """At the first sight it does what is said; after it, a single word of the network weighs a tenth."""
     student = DaggerInsert(WEIGHTS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -110,11 +109,3 @@ def test_what_may_be_left_out_is_checked_if_it_is_not(tmp_path: Path, column: st
     with pytest.raises(InputError) as raised:
         read_table(path, SCENARIO, (1.0, 1.0))
     assert f"line 2, {message}" in str(raised.value)
-
-
-@pytest.mark.parametrize(
-    "given", [*({"deviation_mm": x} for x in (0.9e-4, "1")), *({"deviation_deg": x} for x in (float("nan"), 181.0))]
-)
-def test_assumed_deviations_are_checked(tmp_path: Path, given: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match=r"from 0\.0001 to (10000|180) is allowed\.$|must be a number, got '1'\.$"):
-        apo_bench.read_observation(written(tmp_path, *ROWS), "stick_in_tower", **given)

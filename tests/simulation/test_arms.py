@@ -66,19 +66,6 @@ def test_the_primitive_arms_have_the_published_kinematics() -> None:
     np.testing.assert_allclose(flange("panda_primitive", q), expected @ by(z=0.107), atol=1e-8)
 
 
-def test_a_linkage_opens_as_its_geometry_says() -> None:
-    """Half of 85 mm: 30.6 + 57.1 sin(41.2 degrees - q) - 25.4 mm; the command is the angle of its drivers."""
-    hand = find_arm("ur5e_primitive").hand
-    assert hand is not None
-    length = np.hypot(37.6, 43.0)
-    angle = np.arctan2(37.6, 43.0)
-    expected = 30.6 + length * np.sin(angle - hand.commands[:, 0]) - 25.4
-    np.testing.assert_allclose(1e3 * hand.opening, expected, atol=0.1)
-    assert hand.graded
-    for opening in (0.005, 0.02, 0.04):
-        assert hand.of_command(hand.command(opening)) == pytest.approx(opening, abs=1e-9)
-
-
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) -> None:
     arm = find_arm(name)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from apo_bench import Observation
 from apo_bench.assembly import contact_equations
 from apo_bench.geometry import Array
-from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
+from apo_bench.trial.free_directions import FreeSpace, free_space, nearest_fitting, shortest_above
 from tests import scenes
 
 
@@ -41,16 +41,6 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
     factors = np.linalg.lstsq(G[met].T, x, rcond=None)[0] if met.any() else np.zeros(0)
     np.testing.assert_allclose(G[met].T @ factors, x, atol=1e-7)
     assert (factors > -1e-7).all()
-
-
-@pytest.mark.parametrize("dimensions", [1, 12])
-def test_even_points_come_nearest_first_and_are_spread_as_a_normal_distribution(dimensions: int) -> None:
-    points = np.array(list(even_points(dimensions)))
-    lengths = np.linalg.norm(points, axis=1)
-    assert (np.diff(lengths) >= 0.0).all()
-    np.testing.assert_allclose(points.mean(axis=0), 0.0, atol=0.25)
-    np.testing.assert_allclose(points.std(axis=0), 1.0, atol=0.25)
-    np.testing.assert_array_equal(points, np.array(list(even_points(dimensions))))
 
 
 @pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])

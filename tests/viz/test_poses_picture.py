@@ -10,7 +10,6 @@ import pytest
 from apo_bench import Observation, correct, load_scenario
 from apo_bench.cli import app as cli
 from apo_bench.formats.observation import as_planned
-from apo_bench.geometry import pose
 from apo_bench.viz.poses_picture import poses_lines, poses_panel
 
 SHIFT_M = 2e-3
@@ -35,15 +34,6 @@ def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     mended = poses_panel("corrected", seen, correct(seen, "contact").poses, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
     assert poses_lines([mended]) == ["corrected: largest gap 0.000 mm; all contacts hold"]
-
-
-def test_disappeared_contacts_are_said_to_be() -> None:
-    scenario = load_scenario("vanished_fixture")
-    seen = as_planned(scenario, 1.0, 1.0)
-    goals = np.array(seen.poses)
-    goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
-    found = poses_panel("observed", seen, goals, len(goals))
-    assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)
 
 
 def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -72,23 +72,6 @@ def test_lerobot_finds_every_frame_where_its_table_of_episodes_says(lerobot: dic
     assert parquet.ParquetFile(root / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 2
 
 
-def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobot: dict[str, Path]) -> None:
-    root = lerobot["replays"]
-    info = json.loads((root / "meta" / "info.json").read_text())
-    statistics = json.loads((root / "meta" / "stats.json").read_text())
-    assert statistics.keys() == info["features"].keys()
-    for name, each in statistics.items():
-        assert {len(each[key]) for key in each if key != "count"} == {info["features"][name]["shape"][0]}
-        assert each["count"] == [info["total_frames"]]
-        ordered = np.array([each[key] for key in ("min", "q01", "q10", "q50", "q90", "q99", "max")])
-        assert (np.diff(ordered, axis=0) >= 0).all()
-    schema = parquet.read_schema(root / "meta" / "tasks.parquet")
-    assert json.loads(schema.metadata[b"pandas"])["index_columns"] == ["task"]
-    tasks = parquet.read_table(root / "meta" / "tasks.parquet").to_pylist()
-    assert [task["task_index"] for task in tasks] == [0, 1]
-    assert tasks[0]["task"] == "A block on a block: repeat what was shown."
-
-
 def test_minari_finds_what_was_seen_around_every_action(minari: dict[str, Path], lerobot: dict[str, Path]) -> None:
     h5py = pytest.importorskip("h5py")
     for what, root in minari.items():

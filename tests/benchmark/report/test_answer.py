@@ -52,18 +52,6 @@ def test_equal_counts_are_as_often_only_where_the_interval_is_narrow() -> None:
         assert f"`contact` succeeds in {seeds} of the same {seeds}: {words}" in said(rows)
 
 
-def test_it_says_where_the_curve_falls_to_one_half() -> None:
-    rows = [
-        row(m, i, x < 2.0, noise_mm=x, noise_deg=x)
-        for x in (0.5, 1.0, 2.0, 4.0)
-        for m in ("contact", "paper")
-        for i in range(30)
-    ]
-    half, _ = summary(rows).half_levels
-    words = f"Its success falls to one half at noise level {half.text} (surely: {half.sure_text})."
-    assert words in said(rows)
-
-
 def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
     rows = [row("contact", i) for i in range(5)] + [
         row("contact", i, False, contact_source="false-negative") for i in range(5)

@@ -16,7 +16,9 @@ from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.cli.rates import print_rates
 from apo_bench.io import clean
+from apo_bench.records.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_folder import read_records
 from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
@@ -62,6 +64,19 @@ def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     assert not made
     assert "its module raised SystemExit" in missed[0]
     assert (hostile / "touched").exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "own"),
+    [
+        ({"noise": "my noise.toml"}, ()),
+        ({"noise": "flips:p=0.1/r=0.5"}, ()),
+        ({"noise": "empirical:mine.csv", "contact_source": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
+        *((names, tuple(names.values())) for names in NAMES),
+    ],
+)
+def test_what_is_code_of_ones_own(names: dict[str, str], own: tuple[str, ...]) -> None:
+    assert own_code(row() | names) == own
 
 
 def dangerous(seed: int, evil: str) -> dict[str, Any]:
@@ -112,6 +127,20 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
     for text in (said.out, said.err):
         assert "\x1b" not in text
         assert "\\x1b" in text
+
+
+def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.assembly import Outcome
+    from apo_bench.cli.shared import print_columns
+    from apo_bench.trial.endings import end_record
+    from apo_bench.viz.trial_text import summary_lines
+
+    end = end_record(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
+    print_columns(summary_lines(row("contact", 0, False, pose_source="noise-model") | end, "stick_in_tower"))
+    assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
+    assert end["sentence"] == "\\x1b[31mraised\\nmore"
+    folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
+    assert [one["sentence"] for one in read_records(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
 @pytest.mark.parametrize("name", ["report.html", "tables", "tables/conditions.csv"])

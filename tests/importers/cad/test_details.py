@@ -61,11 +61,3 @@ def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bo
     top = raw.named()["pz"]
     assert top.direction.tolist() == [0.0, 0.0, 1.0]
     assert top.point[2] == pytest.approx(20.0)
-
-
-def test_a_window_in_a_wall_of_a_step_file_stays_open(tmp_path: Path) -> None:
-    body = rod(5.0, 20.0) - block(6, 4, 4, (5, 0, 8))
-    raw = raw_of(tmp_path / "a.step", as_brep(body))
-    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
-    (wall,) = (region for region in raw.regions if region.is_round)
-    assert (wall.is_whole, wall.square) == (True, False)

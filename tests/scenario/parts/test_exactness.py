@@ -167,7 +167,7 @@ def check_walls(solid: Solid, wanted: Wanted) -> None:
         assert face.outline @ n == pytest.approx(np.full(len(face.outline), 1e-3 * distance + n @ t), abs=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(45))
+@pytest.mark.parametrize("seed", range(15))
 def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
     wanted = random_solid(seed)
     solid = solid_of("thing", wanted.body)

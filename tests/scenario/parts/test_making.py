@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Box, physical_pieces
+from apo_bench.geometry import Box
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
     Body,
@@ -95,25 +94,6 @@ def test_a_part_that_is_written_is_read_as_the_same_solid(name: str, tmp_path: P
         assert same.extent_rad == pytest.approx(wall.extent_rad, abs=1e-9)
     if not all(isinstance(piece, Box) for piece in found.pieces):
         assert found.inertia == pytest.approx(wanted.inertia, rel=1e-9, abs=1e-20)
-
-
-def free_radius(pieces, middle: np.ndarray) -> float:
-    """How near pieces of prisms along z come to an axis along z, [m]."""
-    import shapely
-
-    return min(shapely.MultiPoint(p.corners[:, :2]).convex_hull.distance(shapely.Point(middle)) for p in pieces)
-
-
-@pytest.mark.parametrize("clearance_mm", [0.05, 0.25])
-def test_bores_and_slots_that_fit_get_wider_by_the_clearance(clearance_mm: float):
-    holes = [slot(20, 8, (0, -20), names=("low", "right", "high", "left"), fit=True)]
-    hole = bore((0, 10), 5, 0, 12, "bore", fit=True, sides=64)
-    body = extrude(rectangle(60, 70), 0, 12, holes=holes, bores=[hole])
-    made = physical_pieces(solid_of("thing", body), 1e-3 * clearance_mm)
-    assert free_radius(made, np.array([0.0, 0.010])) == pytest.approx(0.005 + 1e-3 * clearance_mm, abs=1e-8)
-    for x in (-0.006, 0.0, 0.006):
-        assert free_radius(made, np.array([x, -0.020])) == pytest.approx(0.004 + 1e-3 * clearance_mm, abs=1e-8)
-    assert max(float(np.abs(p.corners).max()) for p in made) == pytest.approx(0.035, abs=1e-9)
 
 
 def test_a_rim_is_a_face_of_its_own(tmp_path: Path):
