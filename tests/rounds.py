@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import Operation
-from apo_bench.geometry import world_bounds
+from apo_bench.geometry import measure_world_bounds
 from tests.round_parts import bush, countersunk, peg, plate, plug, rail, slider, v_block, wedge
 from tests.scenes import Scene, mm, scene, table, touch
 
@@ -123,7 +123,7 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
     start = dict(of.start)
     for i, (part, k) in enumerate(sorted(first.items())):
         T = np.array(of.goals[k])
-        low, _ = world_bounds([(of.assembly.solids[part], T)])
+        low, _ = measure_world_bounds([(of.assembly.solids[part], T)])
         T[:3, 3] += (0.2 * i - 0.5, 0.45, -low[2]) - T[:3, 3] * (1, 1, 0)
         start[part] = T
     n = len(of.assembly)

@@ -11,7 +11,7 @@ from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.plan import Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import require
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 class Iterate(NamedTuple):
@@ -28,7 +28,7 @@ class Iterate(NamedTuple):
     deviations."""
 
 
-class Try(NamedTuple):
+class FreeingTrial(NamedTuple):
     """One trial of the iterative correction of the paper (its Section 4.2): a solution with some poses free."""
 
     step: int
@@ -82,7 +82,7 @@ class Consistency:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One explanation of the observation: what of it is taken as right, how likely that is, and its poses."""
@@ -110,7 +110,7 @@ class Hypothesis:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Correction:
     """What a corrector returns for an observation of n operations.
@@ -134,7 +134,7 @@ class Correction:
     """Number of directions that the contact equations determine at the corrected poses."""
     trace: tuple[Iterate, ...] = ()
     """The iterations of the solver."""
-    tried: tuple[Try, ...] = ()
+    tried: tuple[FreeingTrial, ...] = ()
     """Every set of motion parameters that the iterative correction of the paper tried, in order."""
     schedule: tuple[Step, ...] = ()
     """Operations to do and undo, in order. Default: every operation once."""

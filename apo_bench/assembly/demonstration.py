@@ -6,12 +6,12 @@ from typing import final
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.poses import Poses, check_parts
 from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
     """The true poses of a trial before any human error; every contact of the scenario holds."""
@@ -27,7 +27,7 @@ class Layout:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Demonstration:
     """The true poses of a demonstration of n operations, without measurement error."""

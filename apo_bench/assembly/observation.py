@@ -14,12 +14,12 @@ from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import ArgumentError, require
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
     """What was observed of a demonstration of n operations: all that a corrector may use."""

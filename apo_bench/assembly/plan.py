@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.poses import Poses, check_parts
 from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
 
@@ -23,7 +23,7 @@ class Step(NamedTuple):
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The target poses of n operations, and the order in which the robot does and undoes them."""
@@ -61,7 +61,7 @@ class Plan:
         )
 
 
-def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
+def find_schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
 
     What is done is always the first few operations: an operation may stand on all that came before it, and what was
@@ -82,7 +82,7 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     return f"leaves operation {done + 1} undone" if done < operations else ""
 
 
-def poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
+def list_poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
     """How many operations are done, and the poses in force, before each time something is undone and at the end."""
     poses = np.array(plan.target_poses)
     done = 0

@@ -12,7 +12,7 @@ from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.errors import require, require_known, shown
 from apo_bench.names import SESSION
 from apo_bench.records import METHODS, TrialConfig, TrialRecord
-from apo_bench.scenario import Scenario, is_named, scenario_path
+from apo_bench.scenario import Scenario, find_scenario_path, is_named
 
 Method = str | Callable[..., Any]
 """A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)` poses."""
@@ -105,7 +105,7 @@ def _scenario_source(scenario: str | Path | Scenario) -> str:
         scenario.source is not None,
         f"the scenario '{scenario.name}' was given, which was not read from a file; give its file.",
     )
-    shipped = is_named(scenario.name) and scenario_path(scenario.name) == scenario.source
+    shipped = is_named(scenario.name) and find_scenario_path(scenario.name) == scenario.source
     return scenario.name if shipped else str(scenario.source)
 
 

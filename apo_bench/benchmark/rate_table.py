@@ -30,7 +30,7 @@ class RateTable:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One dict for each condition: its settings, `trials`, `successes`, `rate`, `low_95`, `high_95` (from 0 to 1)."""
+        """One dict for each condition: settings, `trials`, `successes`, `rate`, `low_95`, `high_95` (from 0 to 1)."""
         table = self._table()
         named = [column for column in table.columns if column.name]
         return [{column.name: column.of(item) for column in named} for item in table.items]
@@ -71,13 +71,13 @@ class RateTable:
         Raises:
             InputError: Another ending, or the file cannot be written.
         """
-        from apo_bench.benchmark.analysis import settings, tally
+        from apo_bench.benchmark.analysis import list_settings, tally
         from apo_bench.benchmark.report.figures.figures import figures
 
         target = Path(path)
         require(target.suffix in (".svg", ".png"), f"'{path}' was given; use a file name that ends in .svg or .png.")
         cells = tally(self.records)
-        drawn = figures(cells, (), settings(cells), (), (), (), ())
+        drawn = figures(cells, (), list_settings(cells), (), (), (), ())
         return drawn["success_over_noise_level"].write(target)
 
     def save(self, folder: str | Path) -> Path:

@@ -13,7 +13,7 @@ from apo_bench.correction.checks.correction_checks import check_correction, chec
 from apo_bench.correction.checks.status import check_facing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, kind, require
-from apo_bench.geometry import Array, real
+from apo_bench.geometry import Array, copy_real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
 
@@ -118,7 +118,7 @@ def _is_ours(corrector: Any) -> bool:
 def _checked_poses(returned: Any, n: int, name: str) -> Array:
     """Poses as an array (n, 4, 4), numbers that are not finite let through."""
     try:
-        poses = real(returned)
+        poses = copy_real(returned)
     except ArgumentError as error:
         raise InputError(f"the corrector '{name}' returned complex numbers as poses; return real ones.") from error
     except (TypeError, ValueError):

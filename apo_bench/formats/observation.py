@@ -12,7 +12,7 @@ from apo_bench.errors import require
 from apo_bench.formats.csv_form import read_table
 from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.formats.observation_json import read_json_observation
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario import Scenario, place_layout
 
 
 class ObservationFile(NamedTuple):
@@ -91,7 +91,7 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
     """Return the nominal poses of a scenario, as if they had been observed with these standard deviations."""
     check_deviations(deviation_mm, deviation_deg)
-    layout = layout_at(scenario, 0.0, 0.0, 0.0)
+    layout = place_layout(scenario, 0.0, 0.0, 0.0)
     n = len(scenario.assembly)
     covariance = np.diag([deviation_mm * 1e-3] * 3 + [radians(deviation_deg)] * 3) ** 2
     return Observation(

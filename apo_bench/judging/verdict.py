@@ -6,8 +6,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Reached, Snapshot
-from apo_bench.geometry import Array, frozen
+from apo_bench.assembly import Assembly, ReachedState, Snapshot
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.judging.demonstrated import judge_demonstrated
 from apo_bench.judging.finished import judge_finished
 from apo_bench.judging.judgement import Judgement
@@ -50,7 +50,7 @@ class Verdict:
 
 
 @check_arguments
-def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Criteria) -> Verdict:
+def judge(assembly: Assembly, reached: ReachedState, reference: Array, criteria: Criteria) -> Verdict:
     """Judge the state that a replay reached.
 
     Args:
@@ -64,8 +64,8 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
     Returns:
         Both judgements, with faults and numbers.
     """
-    reference = frozen(reference, len(assembly), 4, 4)
-    sound = Reached(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
+    reference = copy_frozen(reference, len(assembly), 4, 4)
+    sound = ReachedState(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
     return Verdict(
         criteria.success_means,
         finished=judge_finished(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Layout, Poses
-from apo_bench.geometry import Array, extent, physical_pieces, pose
+from apo_bench.geometry import Array, measure_extent, pose, shrink_pieces
 from apo_bench.scenario.scenario import Scenario
 
 
@@ -39,10 +39,10 @@ def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: floa
     shifts = varied[: len(scenario.shifts)]
     turns = varied[len(scenario.shifts) :]
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
-    return layout_at(scenario, x, y, yaw, shifts, clearance, turns)
+    return place_layout(scenario, x, y, yaw, shifts, clearance, turns)
 
 
-def layout_at(
+def place_layout(
     scenario: Scenario,
     x_m: float,
     y_m: float,
@@ -75,11 +75,13 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not solid.fits:
         return T
     lowered = np.array(T)
-    lowered[2, 3] -= extent(physical_pieces(solid, clearance_m), T[2, :3])[0] - extent(solid.pieces, T[2, :3])[0]
+    lowered[2, 3] -= (
+        measure_extent(shrink_pieces(solid, clearance_m), T[2, :3])[0] - measure_extent(solid.pieces, T[2, :3])[0]
+    )
     return lowered
 
 
-def nominal_start(scenario: Scenario) -> Poses:
+def find_nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad

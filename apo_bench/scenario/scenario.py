@@ -9,13 +9,13 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, copyable, freeze, pose
+from apo_bench.geometry import Array, freeze, make_copyable, pose
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.records import Meaning, Thresholds
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """Where the gripper holds the main part, from above or tilted."""
@@ -34,7 +34,7 @@ class Grasp:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Shift:
     """How far the truth of an operation may vary along a direction that no contact fixes."""
@@ -51,7 +51,7 @@ class Shift:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Turn:
     """How far the truth of an operation may turn about an axis, where no contact fixes that."""
@@ -87,7 +87,7 @@ class Site:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class HumanError:
     """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
@@ -112,10 +112,10 @@ class HumanError:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A task of n operations: parts, contacts, nominal poses, and how layout and human vary. `load_scenario` reads it."""
+    """A task of n operations: parts, contacts, nominal poses, and the variation of layout and human."""
 
     name: str
     """Short name, or that of the file."""

@@ -11,7 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Correction, Observation, Plan, contact_equations, poses_in_force
+from apo_bench.assembly import Correction, Observation, Plan, build_contact_equations, list_poses_in_force
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.failure import predict
@@ -153,8 +153,8 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact each time before work is taken apart, [m]."""
     return [
-        contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
-        for upto, goals in poses_in_force(plan)[:-1]
+        build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        for upto, goals in list_poses_in_force(plan)[:-1]
     ]
 
 

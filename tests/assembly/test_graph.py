@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from apo_bench.assembly import Graph, relation_graph, spell
+from apo_bench.assembly import Graph, build_relation_graph, spell
 from tests import scenes
 
 FIG_7 = {
@@ -40,12 +40,12 @@ def odl(graph: Graph, arc: int) -> tuple[str, str]:
 
 @pytest.mark.parametrize("step", FIG_7)
 def test_the_nodes_of_fig_7(step: int) -> None:
-    graph = relation_graph(scenes.pockets().assembly, step)
+    graph = build_relation_graph(scenes.pockets().assembly, step)
     assert (graph.step, " | ".join(map(str, graph.nodes))) == (step, FIG_7[step])
 
 
 def test_the_arcs_of_fig_7() -> None:
-    graph = relation_graph(scenes.pockets().assembly)
+    graph = build_relation_graph(scenes.pockets().assembly)
     found = {
         str(arc): (*odl(graph, i), arc.made + 1, None if arc.lost is None else arc.lost + 1)
         for i, arc in enumerate(graph.arcs)
@@ -59,8 +59,8 @@ def test_every_arc_is_in_the_graph_with_its_equations(name: str) -> None:
     """Ends are nodes; an arc that stands joins what stands; the operations are those of the ODLs when it was made."""
     assembly = scenes.ALL[name]().assembly
     for step in range(1, len(assembly) + 1):
-        graph = relation_graph(assembly, step)
-        made = {arc.name: relation_graph(assembly, arc.made + 1) for arc in graph.arcs}
+        graph = build_relation_graph(assembly, step)
+        made = {arc.name: build_relation_graph(assembly, arc.made + 1) for arc in graph.arcs}
         for i, arc in enumerate(graph.arcs):
             assert {arc.manipulated, arc.environment} <= set(graph.nodes)
             if arc.lost is None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly
-from apo_bench.assembly import Operation, placements, product, spell
+from apo_bench.assembly import Operation, compute_placements, evaluate_odl, spell
 from tests import scenes
 
 
@@ -49,8 +49,10 @@ def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:
     for build in scenes.ALL.values():
         scene = build()
         goals = scenes.noisy(scene.goals, np.random.default_rng(1), 20.0, 20.0)
-        for odls, poses in zip(scene.assembly.odls(), placements(scene.assembly, scene.start, goals), strict=True):
+        for odls, poses in zip(
+            scene.assembly.odls(), compute_placements(scene.assembly, scene.start, goals), strict=True
+        ):
             for part, odl in odls.items():
-                assert_allclose(poses[part], product(odl, goals), atol=1e-12)
+                assert_allclose(poses[part], evaluate_odl(odl, goals), atol=1e-12)
             for part in set(poses) - set(odls):
                 assert poses[part] is scene.start[part]

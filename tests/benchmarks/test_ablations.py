@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from apo_bench import Correction, Observation
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import paper_track
 from benchmarks.ablations import last_only, minimal, no_disappeared, no_history
@@ -62,7 +62,7 @@ def test_without_history_only_operations_that_moved_a_part_last_are_corrected(na
 def test_without_lost_contacts_the_fixture_of_example_5_3_stays_wrong() -> None:
     given = observe("fixture")
     found, whole = no_disappeared(given), paper(given)
-    system = contact_equations(given.assembly, given.start, given.poses)
+    system = build_contact_equations(given.assembly, given.start, given.poses)
     against = [str(relation.contact) for relation in given.assembly.relations()].index("castle2.py on cube.ny")
     assert (found.status, freed(found), freed(whole)) == ("converged", (5, 3, 1), (5, 3, 2, 1))
     assert_array_equal(found.poses[1], given.poses[1])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Observation, Scenario, explain, load_scenario
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from apo_bench.correction.directions import directions
 from apo_bench.correction.explanation import Explanation
 from apo_bench.correction.solvers.newton import solve_newton
@@ -35,7 +35,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
     """What is left of the contacts when goal k has moved and some later ones adapt."""
     goals = np.array(seen.poses)
     goals[k] = goals[k] @ pose.exp(STEP * twist)
-    system = contact_equations(seen.assembly, seen.start, seen.poses)
+    system = build_contact_equations(seen.assembly, seen.start, seen.poses)
     free = tuple(adapting)
     if not free:
         return float(np.abs(system.residual(goals)).max())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
+from apo_bench.geometry import Face, Hull, Solid, find_nearest_alike, find_revolution, find_symmetries, make_turn, pose
 from tests.round_contacts import MM, part, ring, tube, wall
 
 
@@ -46,7 +46,7 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
     rng = np.random.default_rng(len(corners))
     for at in (np.eye(4), pose.exp(rng.standard_normal(6) * [0.02, 0.02, 0.02, 1, 1, 1])):
         solid = prism(corners - corners.mean(axis=0), height, at)
-        found = symmetries(solid)
+        found = find_symmetries(solid)
         assert len(found) == order
         spots = solid.pieces[0].corners
         for g in found:
@@ -61,10 +61,12 @@ def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
     T = np.eye(4)
     expected = np.eye(4)
     T[:3, :3], expected[:3, :3] = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
-    axis = revolution(solid)
-    found = nearest_alike(solid, T, expected)
+    axis = find_revolution(solid)
+    found = find_nearest_alike(solid, T, expected)
     every = [
-        T @ g @ turn_about(axis.point, axis.axis, t) for g in symmetries(solid) for t in np.linspace(-np.pi, np.pi, 721)
+        T @ g @ make_turn(axis.point, axis.axis, t)
+        for g in find_symmetries(solid)
+        for t in np.linspace(-np.pi, np.pi, 721)
     ]
     best = max(np.trace(expected[:3, :3].T @ one[:3, :3]) for one in every)
     assert np.trace(expected[:3, :3].T @ found[:3, :3]) >= best - 1e-9

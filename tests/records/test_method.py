@@ -4,7 +4,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.assembly import ReobservingCorrector
-from apo_bench.benchmark.analysis import rank
+from apo_bench.benchmark.analysis import rank_method
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTORS, knows_truth, may_reobserve, parse_method, probes, uses_contacts
 from apo_bench.records.methods import checked_method
@@ -47,7 +47,7 @@ def test_what_a_method_meets_is_that_of_its_plan():
         *("oracle", "oracle+probe", "uncorrected", "uncorrected+probe", "spiral-search"),
         *("contact", "contact+probe", "contact+spiral", "paper", "paper-track", "snap", "snap+spiral"),
     ]
-    assert sorted(ranked, key=lambda m: (rank(m), m)) == ranked
+    assert sorted(ranked, key=lambda m: (rank_method(m), m)) == ranked
 
 
 def test_methods_that_may_look_are_those_that_can_ask():

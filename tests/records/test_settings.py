@@ -13,9 +13,9 @@ import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
-from apo_bench.cli.shared.setting_options import sweep_options, trial_options
+from apo_bench.cli.shared.setting_options import make_sweep_options, make_trial_options
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.records import KEY, RECORD_FIELDS, REQUIRED, SETTINGS, settings_of
+from apo_bench.records import KEY, RECORD_FIELDS, REQUIRED, SETTINGS, restore_settings
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "tests" / "kept" / "sweep"
@@ -43,9 +43,9 @@ def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
 
 
 def test_every_setting_is_an_option_of_run_and_sweep() -> None:
-    options = {option.name for option in trial_options()}
+    options = {option.name for option in make_trial_options()}
     assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"noise_level"}
-    assert options - {"seed"} <= {option.name for option in sweep_options()} | {"secret_seed_file"}
+    assert options - {"seed"} <= {option.name for option in make_sweep_options()} | {"secret_seed_file"}
 
 
 def test_the_environment_has_the_same_defaults() -> None:
@@ -75,7 +75,7 @@ def test_a_trial_is_written_as_before() -> None:
     """Bytes are promised on one machine; everywhere the columns, their order, the settings and the ending are."""
     for line in (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()[:3]:
         before = json.loads(line)
-        again = run_trial(settings_of(before, before["scenario"]))
+        again = run_trial(restore_settings(before, before["scenario"]))
         assert [column for column in again if column in before] == list(before)
         same = [info.name for info in SETTINGS.values() if info.name in before]
         for column in (*same, "success", "failure_stage", "failure_code", "corrected_operations"):

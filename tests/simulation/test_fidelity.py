@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
-from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.geometry import measure_intrusion_depths, pose
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles
 from apo_bench.simulation.robot.paths import Trajectory, translate
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene.world import make_initial_state
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -61,12 +61,12 @@ def test_cache_keys_differ_where_anything_before_differs():
     later = np.array(layout.poses)
     later[-1, :3, 3] += [0.0, 0.0, 1e-9]
     other = Plan(plan.assembly, plan.start, later)
-    a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
+    a, b = (cache_keys(scene(), layout.start, "full", plan_moves(p, scene())) for p in (plan, other))
     assert a[:-1] == b[:-1]
     assert a[-1] != b[-1]
-    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", plan_moves(plan, scene())))
     elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
-    assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), elsewhere, "full", plan_moves(plan, scene())))
 
 
 def test_near_contact_takes_as_much_simulated_time():
@@ -82,9 +82,9 @@ def test_near_contact_takes_as_much_simulated_time():
 def test_no_turn_that_comes_near_anything_is_skipped():
     its = scene()
     rng = np.random.default_rng(5)
-    data = initial_state(its.work, shown().layout.start)
+    data = make_initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
-    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
+    hand = [obstacles.MovingPieces(its.pieces["stick"], np.eye(4))]
     came = 0
     skipped = 0
     for _ in range(60):
@@ -92,10 +92,10 @@ def test_no_turn_that_comes_near_anything_is_skipped():
         end = translate(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
         line = Trajectory(start, end, 0.2, np.asarray)
         s = np.linspace(0.0, 1.0, 201)
-        spans = obstacles.near_spans(its, data, hand, ("stick",), line, s)
+        spans = obstacles.find_near_spans(its, data, hand, ("stick",), line, s)
         for i, T in enumerate(line.poses(s)):
             depths = [
-                intrusion_depths(
+                measure_intrusion_depths(
                     its.pieces["stick"],
                     T[:3, :3],
                     T[None, :3, 3],

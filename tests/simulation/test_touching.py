@@ -10,13 +10,13 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.robot.by_wrist import comply, press, reading, wrist_of, zero
-from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, zero
+from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import weld
-from apo_bench.simulation.robot.paths import smooth_trajectory, steady_trajectory, translate
+from apo_bench.simulation.robot.paths import plan_steady_trajectory, smooth_trajectory, translate
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import READING_S, WristSensor, part_loads
-from apo_bench.simulation.scene.world import allow_sleep, part_pose, set_part_pose
+from apo_bench.simulation.robot.wrist import READING_S, WristSensor, compute_part_loads
+from apo_bench.simulation.scene.world import allow_sleep, get_part_pose, set_part_pose
 
 DOWN = np.array([0.0, 0.0, -1.0])
 UP = -DOWN
@@ -30,7 +30,7 @@ def scene_of(arm: str = "six_axis", grasp: str = "friction", step_s: float = 0.0
 def empty_hand(scene: Scene, name: str, z: float, seed: int = 1) -> tuple[Robot, WristSensor]:
     """A robot whose wrist was zeroed, its closed hand above the table at a height of the tip, [m]."""
     robot = Robot(scene, scene.scenario.start)
-    wrist = wrist_of(robot, name, np.random.default_rng(seed))
+    wrist = get_wrist(robot, name, np.random.default_rng(seed))
     robot.fingers(0.002)
     T = pose.at((0.0, 0.0, 0.0)) @ robot.T
     T[:3, 3] = 0.1, 0.16, 0.2
@@ -52,7 +52,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     start["stick"] = pose.at((0.1, 0.16, 0.01))
     robot = Robot(scene, start)
     set_part_pose(scene.work, robot.data, "stick", start["stick"])
-    wrist = wrist_of(robot, name, np.random.default_rng(1), **settings)
+    wrist = get_wrist(robot, name, np.random.default_rng(1), **settings)
     T = np.array(robot.T)
     T[:3, 0] = 0.0, -1.0, 0.0
     T[:3, 1] = -1.0, 0.0, 0.0
@@ -69,8 +69,8 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
         weld(scene, robot.data, "stick", True)
     robot.forces.hold("stick")
     robot.stand()
-    T_tip_stick = pose.inverse(robot.tip()) @ part_pose(scene.work, robot.data, "stick")
-    wrist.hold(*part_loads(scene, {"stick": T_tip_stick}))
+    T_tip_stick = pose.inverse(robot.tip()) @ get_part_pose(scene.work, robot.data, "stick")
+    wrist.hold(*compute_part_loads(scene, {"stick": T_tip_stick}))
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, lift), 0.2))
     robot.stand()
     return robot, wrist, T_tip_stick
@@ -78,7 +78,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
 
 def mean_wrench(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -> Array:
     """The mean wrench while the robot stands, (6,)."""
-    with reading(robot, wrist):
+    with read_wrist(robot, wrist):
         out = []
         for _ in range(round(seconds / 0.004)):
             robot.wait(0.004)
@@ -108,11 +108,11 @@ def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with allow_sleep(scene.work, asleep):
         robot, wrist = empty_hand(scene, "wrist", 0.014)
-        left = press(robot, steady_trajectory(robot.T, translate(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
+        left = press(robot, plan_steady_trajectory(robot.T, translate(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
         assert left is not None
         assert robot.wrist is None
         assert np.linalg.norm(robot.T[:3, 3] - translate(robot.T, UP, 0.0)[:3, 3]) == 0.0
-        reach = max(box.center[2] + box.half[2] for box in gripper_boxes(scene.kinematics, 0.002))
+        reach = max(box.center[2] + box.half[2] for box in list_gripper_boxes(scene.kinematics, 0.002))
         assert robot.T[2, 3] == pytest.approx(reach, abs=5e-5)
         assert left == pytest.approx(robot.T[2, 3] - 0.004, abs=1e-4)
 
@@ -141,7 +141,7 @@ def test_the_wrench_of_a_push_is_that_of_its_contacts(arm: str, newton: float) -
         robot, wrist = empty_hand(scene, "ideal", 0.0102)
         comply(robot, Pushing(newton, 1.5), robot.T[:3, 3], wrist)
         tip = robot.T[:3, 3]
-        with reading(robot, wrist):
+        with read_wrist(robot, wrist):
             robot.wait(0.2)
             wrench = wrist.wrench(tip)
         assert wrench[2] == pytest.approx(newton, abs=0.02)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.analysis import detections
+from apo_bench.benchmark.analysis import tabulate_detection
 from apo_bench.cli import app as cli
 from apo_bench.records import DETECTED
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
@@ -60,7 +60,9 @@ def test_a_trial_says_how_many_contacts_were_recognised(
 
 def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
     rows = [row("detected", "paper"), row("detected", "contact"), row("detected", seed=1, contacts_false_negative=1)]
-    (found,) = detections([*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)])
+    (found,) = tabulate_detection(
+        [*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)]
+    )
     assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [2, (1, 2), 6, 1, 0]
     assert found["precision"] == 1.0
     assert found["recall"] == pytest.approx(6 / 7)

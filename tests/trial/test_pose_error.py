@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Poses, Reached, Snapshot, placements
+from apo_bench.assembly import Poses, ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.trial.pose_error import pose_errors
 from tests import scenes
@@ -21,9 +21,9 @@ def state(poses: Poses) -> Snapshot:
     return Snapshot(poses, penetration_m=0.0, speed_m_s=0.0, spin_rad_s=0.0, released=True)
 
 
-def reached(scene: scenes.Scene, goals: Array) -> Reached:
-    after = tuple(state(poses) for poses in placements(scene.assembly, scene.start, goals))
-    return Reached(after, after[-1])
+def reached(scene: scenes.Scene, goals: Array) -> ReachedState:
+    after = tuple(state(poses) for poses in compute_placements(scene.assembly, scene.start, goals))
+    return ReachedState(after, after[-1])
 
 
 def errors(scene: scenes.Scene, wrong: Mapping[int, Array]) -> tuple[float | None, float | None]:

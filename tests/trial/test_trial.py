@@ -20,7 +20,7 @@ from apo_bench import (
     load_scenario,
     run_trial,
 )
-from apo_bench.assembly import Consistency, Suspect, Try, relation_graph
+from apo_bench.assembly import Consistency, FreeingTrial, Suspect, build_relation_graph
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, outcomes
 from apo_bench.records.settings import LARGEST_SEED
@@ -49,7 +49,7 @@ def rows(scene: Scene, shown: SimulatedDemonstration) -> dict[str, dict[str, Any
 
 def refuses(seen: Observation) -> Correction:
     """A corrector that never converges."""
-    tried = (Try(2, (2,), float("inf")),)
+    tried = (FreeingTrial(2, (2,), float("inf")),)
     return Correction(seen.poses, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
 
 
@@ -95,7 +95,7 @@ def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None
 
 def doubts(seen: Observation) -> Correction:
     """As the paper corrects, with a test that fails and names the first relation."""
-    arcs = relation_graph(seen.assembly).arcs
+    arcs = build_relation_graph(seen.assembly).arcs
     suspects = tuple(Suspect(a.name, a.contacts, a.made, 1.0, 3, 0.8 if a is arcs[0] else 0.0) for a in arcs)
     test = Consistency(30.0, 5, 1e-5, 0.01, suspects)
     return replace(correct(seen, "paper"), test=test, dropped=("R1",))

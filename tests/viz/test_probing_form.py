@@ -12,8 +12,8 @@ import pytest
 from apo_bench import Plan, Scene, build_scene, load_scenario
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.scenario.layout import place_layout
+from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
@@ -31,7 +31,7 @@ def scene(name: str) -> Scene:
 
 @cache
 def plan(name: str) -> Plan:
-    layout = layout_at(load_scenario(name), 0.1, 0.0, 0.3)
+    layout = place_layout(load_scenario(name), 0.1, 0.0, 0.3)
     return Plan(scene(name).scenario.assembly, layout.start, layout.poses)
 
 
@@ -74,7 +74,7 @@ def test_touches_are_where_the_simulated_hand_touches(name: str, frames: str) ->
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
     for one, (step, t) in zip(
-        form(name, frames)["steps"], moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
+        form(name, frames)["steps"], plan_moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
     ):
         assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
         for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):

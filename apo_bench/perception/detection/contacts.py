@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Contact, Facing, Observation, placements
+from apo_bench.assembly import Contact, FacingPair, Observation, compute_placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
@@ -24,7 +24,7 @@ from apo_bench.perception.detection.evidence import (
     DetectedContacts,
     Evidence,
     collect_evidence,
-    with_contacts,
+    keep_evident_contacts,
     without_contacts,
 )
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
@@ -55,7 +55,7 @@ def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> 
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    is_uncorrected = placements(assembly, observation.start, belief.poses)
+    is_uncorrected = compute_placements(assembly, observation.start, belief.poses)
     standing = set(assembly.fixed)
     for k, (operation, poses) in enumerate(zip(assembly.operations, is_uncorrected, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
@@ -64,7 +64,7 @@ def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> 
         belief = best.belief
         evidence += collect_evidence(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
-    return DetectedContacts(with_contacts(assembly, evidence), tuple(evidence))
+    return DetectedContacts(keep_evident_contacts(assembly, evidence), tuple(evidence))
 
 
 class _Found(NamedTuple):
@@ -126,7 +126,7 @@ class _Around:
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
+    def _judged(self, a: str, b: str, pair: FacingPair, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         # Body twists of all poses -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])

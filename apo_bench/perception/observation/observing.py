@@ -10,7 +10,7 @@ from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
 from apo_bench.geometry import is_rigid
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
-from apo_bench.records import noise_pair
+from apo_bench.records import parse_noise_level
 
 
 @check_arguments
@@ -38,7 +38,7 @@ def observe(
             noise level was given with a function.
     """
     if isinstance(noise, str | type):
-        noise = make_noise(noise, NoiseLevel(*noise_pair(1.0 if noise_level is None else noise_level)))
+        noise = make_noise(noise, NoiseLevel(*parse_noise_level(1.0 if noise_level is None else noise_level)))
     elif noise_level is not None:
         raise InputError(
             f"the level {noise_level!r} was given together with a noise model that is made already; leave it out, "

@@ -8,15 +8,15 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Array, copyable, freeze
-from apo_bench.io import named_files
+from apo_bench.geometry import Array, freeze, make_copyable
+from apo_bench.io import list_named_files
 
 _GRADED = 0.6
 """A gripper of which one step of the command makes this part of its opening knows open and closed only."""
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
     """What an arm can do; None: not stated."""
@@ -32,7 +32,7 @@ class ArmLimits:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Hand:
     """Measured from closed to open; openings are of each finger, half the distance between the pads, [m]."""
@@ -91,7 +91,7 @@ class Hand:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Arm:
     """A robot arm with a gripper of two sides, for `build_scene`.
@@ -136,7 +136,7 @@ class Arm:
 
     def __post_init__(self) -> None:
         freeze(self, home=(len(self.joints),))
-        object.__setattr__(self, "files", self.files or named_files(self.mjcf))
+        object.__setattr__(self, "files", self.files or list_named_files(self.mjcf))
 
     def finger_joints(self, opening: float) -> Array:
         """Return the positions of the joints `fingers` at an opening [m] of the empty gripper, (k,)."""

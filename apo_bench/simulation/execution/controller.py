@@ -5,16 +5,16 @@ from collections.abc import Callable
 from typing import Any
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, poses_in_force
+from apo_bench.assembly import Outcome, Plan, Poses, ReachedState, ReplayResult, Snapshot, list_poses_in_force
 from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
 from apo_bench.simulation.execution.execution import Execution, failed_outcome, moves_with_error
-from apo_bench.simulation.execution.prepare import Move, key_angles
+from apo_bench.simulation.execution.prepare import Move, solve_key_angles
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.hooks import Hooks, as_hooks
 from apo_bench.simulation.robot import ExecutionAborted, Robot
-from apo_bench.simulation.scene import Scene, allow_sleep, snapshot
+from apo_bench.simulation.scene import Scene, allow_sleep, take_snapshot
 
 _SETTLE_S = 0.5
 """At the end, everything is left alone this long."""
@@ -64,7 +64,7 @@ def replay(
         outcome = refused or execution.run(todo, cache, keys)
         final = _settle(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
-        reached=Reached(after=tuple(execution.progress.after), final=final),
+        reached=ReachedState(after=tuple(execution.progress.after), final=final),
         outcome=outcome,
         peak_force_n=robot.forces.peak_n,
         sim_time_s=float(robot.data.time),
@@ -79,12 +79,12 @@ def replay(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in poses_in_force(plan):
+    for upto, goals in list_poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return failed_outcome(plan, "plan", "unstable_goal", k)
     for step, transfer in todo:
-        if code := key_angles(transfer, scene).code:
+        if code := solve_key_angles(transfer, scene).code:
             return failed_outcome(plan, "plan", code, step.operation)
     return None
 
@@ -97,4 +97,4 @@ def _settle(robot: Robot, plan: Plan) -> Snapshot | None:
     except ExecutionAborted as aborted:
         if aborted.code == "unstable_simulation":
             return None
-    return snapshot(robot.scene.work, robot.data, plan.start)
+    return take_snapshot(robot.scene.work, robot.data, plan.start)

@@ -17,7 +17,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
+from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
 
 _Image = NDArray[np.uint8]
 SceneCamera: TypeAlias = str | mujoco.MjvCamera
@@ -62,13 +62,13 @@ def picture_with_arm(
         state: `qpos` of a replay, which is then shown as it is; of `poses` only those of fixed parts count.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
-    return _draw(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)
+    return _draw(scene.work, build_data_with_arm(scene, poses, state), width, height, camera, more)
 
 
-def data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
+def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
     """What `picture_with_arm` shows, as `mujoco.MjData` of the scene where the robot works."""
     data = _at(scene.work, scene, poses)
-    arm_home(scene, data)
+    move_arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)
@@ -88,7 +88,7 @@ def place_for_picture(model: Any, data: Any) -> None:
     mujoco.mj_camlight(model, data)
 
 
-def arm_home(scene: Scene, data: Any) -> None:
+def move_arm_home(scene: Scene, data: Any) -> None:
     """Put the arm at home in a state of its world, its fingers open."""
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
         data.joint(f"arm/{joint}").qpos = q
@@ -270,7 +270,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
-    data = initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
+    data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
         set_part_pose(world, data, part, poses.get(part, scene.scenario.start[part]))
     data.mocap_pos[:, 2] = -1.0

@@ -7,7 +7,7 @@ from typing import Any, Literal, final
 import mujoco
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Piece, physical_pieces
+from apo_bench.geometry import Piece, shrink_pieces
 from apo_bench.records import Criteria, check
 from apo_bench.scenario import Scenario, check_clearance
 from apo_bench.simulation.arms.arm import Arm
@@ -105,7 +105,7 @@ def build_scene(
         grasp="weld" if grasp == "weld" else "friction",
         arm=robot,
         physics=settings,
-        pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
+        pieces={name: shrink_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,
         work=work,
         kinematics=kinematics,

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import placements
-from apo_bench.scenario import Scenario, layout_at, load_scenario
+from apo_bench.assembly import compute_placements
+from apo_bench.scenario import Scenario, load_scenario, place_layout
 from apo_bench.simulation.scene.render import SceneCamera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 
@@ -25,6 +25,6 @@ def show_scenario(
     """
     loaded = load_scenario(scenario)
     x, y = loaded.site.center_m
-    layout = layout_at(loaded, x, y, float(np.mean(loaded.site.yaw_rad)))
-    poses = placements(loaded.assembly, layout.start, layout.poses)[-1] if finished else layout.start
+    layout = place_layout(loaded, x, y, float(np.mean(loaded.site.yaw_rad)))
+    poses = compute_placements(loaded.assembly, layout.start, layout.poses)[-1] if finished else layout.start
     return draw_picture(build_scene(loaded), poses, camera=camera)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError
-from apo_bench.benchmark.analysis import summary
+from apo_bench.benchmark.analysis import summarise
 from tests.benchmark.analysis.test_rates import row
 
 METHODS = ("uncorrected", "paper", "contact")
@@ -33,11 +33,11 @@ def rows(seeds: int = 12, scenarios: int = 1) -> list[dict[str, Any]]:
 def test_the_order_of_rows_does_not_matter(order: Any) -> None:
     shuffled = rows()
     order.shuffle(shuffled)
-    assert summary(shuffled) == summary(rows())
+    assert summarise(shuffled) == summarise(rows())
 
 
 def test_other_references() -> None:
-    found = summary(rows(), references=("contact",))
+    found = summarise(rows(), references=("contact",))
     assert {p.reference for p in found.pairs} == {"contact"}
     with pytest.raises(InputError, match="twice"):
-        summary([*rows(), rows()[0]])
+        summarise([*rows(), rows()[0]])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, InputError, Observation, correct
-from apo_bench.assembly import Step, contact_equations, largest_gap
+from apo_bench.assembly import Step, build_contact_equations, measure_largest_gap
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.solvers.newton import LENGTH_M, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
@@ -50,7 +50,7 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
-    system = contact_equations(scene.assembly, scene.start, goals)
+    system = build_contact_equations(scene.assembly, scene.start, goals)
     return solve_newton(system.among(system.containing(freed)), goals, freed).gap_m * 1e3
 
 
@@ -101,15 +101,15 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
         assert found.gap_after_m < NOTHING_M
-        assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses) > 3e-4
-        assert largest_gap(seen.assembly, seen.start, found.poses) < NOTHING_M
+        assert found.gap_before_m == measure_largest_gap(seen.assembly, seen.start, seen.poses) > 3e-4
+        assert measure_largest_gap(seen.assembly, seen.start, found.poses) < NOTHING_M
         assert is_rigid(found.poses).all()
 
 
 def drift(scene: scenes.Scene, seen: Array) -> float:
     """How far the solver moved what no contact fixes, over 2 mm; rotations as the way of a point 40 mm away."""
     n = len(seen)
-    system = contact_equations(scene.assembly, scene.start, seen)
+    system = build_contact_equations(scene.assembly, scene.start, seen)
     found = solve_newton(system, seen, range(n))
     assert found.gap_m < NOTHING_M
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], n)
@@ -213,7 +213,7 @@ def test_bare_goals_are_measured_and_wrapped() -> None:
     goals = paper(seen).poses
     found = correct(seen, lambda observation: goals)
     assert (found.status, found.freed, found.rank) == ("converged", (2, 1, 0), 13)
-    assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses)
+    assert found.gap_before_m == measure_largest_gap(seen.assembly, seen.start, seen.poses)
     assert found.gap_after_m < NOTHING_M
     assert correct(seen, lambda observation: observation.poses).freed == ()
 

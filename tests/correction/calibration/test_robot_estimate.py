@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, prior_estimate
+from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, make_prior_estimate
 from apo_bench.geometry import pose
 from apo_bench.records.robot_error import Sigmas
 
@@ -46,7 +46,7 @@ def around() -> list[tuple[float, float]]:
 def taught(seed: int = 0) -> RobotEstimate:
     """A belief of which every unknown is other than zero."""
     rng = np.random.default_rng(seed)
-    belief = prior_estimate(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
+    belief = make_prior_estimate(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
     for _ in range(12):
         n = rng.standard_normal(3)
         n /= np.linalg.norm(n)
@@ -71,7 +71,7 @@ def test_what_is_commanded_really_comes_to_be() -> None:
 def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
     xi = np.array([0.8e-3, -1.1e-3, 1.7e-3, 4e-3, -6e-3, 3e-3])
     E = displaced(xi)
-    belief = prior_estimate(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
+    belief = make_prior_estimate(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
     # the plane as felt: what lies in it comes to where it really is in height, wherever
     for at in [(0.5, 0.1), (0.3, -0.2)]:
         B = pose.at((*at, 0.0), (180.0, 0.0, 0.0))
@@ -88,7 +88,7 @@ def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
 def test_the_order_of_touches_does_not_matter() -> None:
     E = displaced(np.array([0.3e-3, 0.5e-3, -0.9e-3, 2e-3, 3e-3, -1e-3]))
     touches = [touch_of(E, at, 5e-5) for at in around()] + [touch_of(E, (0.5, 0.1), 5e-5, off_m=3e-3)]
-    prior = prior_estimate(UNKNOWN, 6, MIDDLE)
+    prior = make_prior_estimate(UNKNOWN, 6, MIDDLE)
     first = prior.touch(*touches)
     assert [one.offset for one in first.refused] == [touches[3].offset]
     for order in permutations(touches):
@@ -105,7 +105,7 @@ def test_joints_are_told_through_the_jacobian() -> None:
     """Touches of a robot whose encoders alone are off: with its Jacobians the touched heights are explained."""
     rng = np.random.default_rng(4)
     delta = np.radians(0.05) * rng.standard_normal(6)
-    prior = prior_estimate(Sigmas(joints_deg=0.05), 6, MIDDLE)
+    prior = make_prior_estimate(Sigmas(joints_deg=0.05), 6, MIDDLE)
     touches = []
     for seed in range(8):
         B = pose.at(MIDDLE + rng.uniform(-0.2, 0.2, 3), (180.0, 0.0, rng.uniform(-180.0, 180.0)))

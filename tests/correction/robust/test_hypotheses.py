@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import correct
-from apo_bench.assembly import OutlierModel, placements
+from apo_bench.assembly import OutlierModel, compute_placements
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.camera import Camera
@@ -28,7 +28,7 @@ def test_a_part_that_is_seen_where_it_was_before_is_said_to_be(seed):
     name = "vanished_fixture"
     observation = look(name, seed)
     first = shown(name, seed)[2]
-    before = (first.start, *placements(first.assembly, first.start, first.poses))[4]["stick"]
+    before = (first.start, *compute_placements(first.assembly, first.start, first.poses))[4]["stick"]
     off = pose.exp(np.repeat([1e-3, np.radians(1.0)], 3) * np.random.default_rng(seed).standard_normal(6))
     found = correct(seen_at(observation, 4, before @ off))
     assert found.left_out == (4,)

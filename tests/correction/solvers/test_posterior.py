@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.gauss_newton import nearest_poses
-from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank
+from apo_bench.correction.solvers.gauss_newton import find_nearest_poses
+from apo_bench.correction.solvers.posterior import compute_freedom, compute_jacobian_rank
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -35,10 +35,10 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     L = crooked(len(scene.goals), rng, 5.0, 3.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest_poses(system, seen, L)
-    known = freedom_of(found.Jt)
+    found = find_nearest_poses(system, seen, L)
+    known = compute_freedom(found.Jt)
     assert known is not None
-    assert known.rank == jacobian_rank(found.Jt) == RANKS[name]
+    assert known.rank == compute_jacobian_rank(found.Jt) == RANKS[name]
     assert known.free.shape == (6 * n, 6 * n - RANKS[name])
     assert known.redundant == 3 * len(system) - RANKS[name]
     assert known.spectral_gap > 1e5

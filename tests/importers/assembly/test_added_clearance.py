@@ -7,26 +7,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.geometry import Solid, physical_pieces
+from apo_bench.geometry import Solid, shrink_pieces
 from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.parts.making import extrude, join, rectangle
+from apo_bench.scenario.parts.making import extrude, join, make_rectangle
 from tests.importers.assembly.test_blocked import FLOOR, made
 
-SLOTTED = join(FLOOR, *(extrude(rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
+SLOTTED = join(FLOOR, *(extrude(make_rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
 
 
 def slotted(folder: Path, thick: float) -> tuple[PosedPart, ...]:
     """A tongue on the floor of a slot that is 20 mm wide."""
-    tongue = extrude(rectangle(thick, 30), 0, 35, bottom="foot", top="head")
+    tongue = extrude(make_rectangle(thick, 30), 0, 35, bottom="foot", top="head")
     return made(folder, base=(SLOTTED, (0, 0, 0)), tongue=(tongue, (0, 0, 10)))
 
 
 def width(solid: Solid, clearance_mm: float = 0.0) -> float:
-    pieces = physical_pieces(solid, 1e-3 * clearance_mm)
+    pieces = shrink_pieces(solid, 1e-3 * clearance_mm)
     return 1e3 * float(np.ptp(np.concatenate([piece.corners for piece in pieces])[:, 0]))
 
 

@@ -14,7 +14,7 @@ from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.staging import find_stance, stage_parts
 from apo_bench.importers.assembly.writing import scenario_text
-from apo_bench.scenario.parts.making import extrude, rectangle, shaft
+from apo_bench.scenario.parts.making import extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made
 
 
@@ -43,9 +43,9 @@ def test_what_is_heavy_beside_its_foot_does_not_stand() -> None:
 
 
 def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) -> None:
-    slab = extrude(rectangle(120, 120), 0, 30, bottom="bottom", top="top")
-    lid = extrude(rectangle(110, 110), 0, 30, bottom="bottom", top="top")
-    rod = shaft(6, 0, 50, "side", bottom="tip", top="head")
+    slab = extrude(make_rectangle(120, 120), 0, 30, bottom="bottom", top="top")
+    lid = extrude(make_rectangle(110, 110), 0, 30, bottom="bottom", top="top")
+    rod = make_shaft(6, 0, 50, "side", bottom="tip", top="head")
     places = {"slab": ("slab", at(0, 0, 0)), "lid": ("lid", at(0, 0, 30)), "rod": ("rod", at(0, 25, 66, 90, 0, 0))}
     result = new_scenario(on_the_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
     assert "'rod' lies on a round wall at its start and may roll" in result.notes
@@ -59,7 +59,7 @@ def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) ->
 
 
 def test_the_assembly_stands_on_the_table_whichever_axis_looks_up(tmp_path: Path) -> None:
-    block = extrude(rectangle(20, 30), 0, 40, bottom="bottom", top="top")
+    block = extrude(make_rectangle(20, 30), 0, 40, bottom="bottom", top="top")
     parts = made(tmp_path, {"block": block}, {"one": ("block", at(5, 6, 7)), "other": ("block", at(5, 6, 47))})
     for up, axis in {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}.items():
         for sign in (1.0, -1.0):

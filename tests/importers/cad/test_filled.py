@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.pieces import cutting
 from tests.importers.cad.made import block, rod, write_stl
 
@@ -24,12 +24,12 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
-    whole = import_part(raw, "whole", tmp_path, "a.stl")
+    whole = import_solid(raw, "whole", tmp_path, "a.stl")
     assert len(whole.solid.rounds) == 6
     assert not whole.cut.filled
     monkeypatch.setattr(cutting, "MOST_PIECES", 130)
     at_the_second = np.array([[10.0, 0.3, 2.0]])
-    part = import_part(raw, "part", tmp_path, "a.stl", others=at_the_second)
+    part = import_solid(raw, "part", tmp_path, "a.stl", others=at_the_second)
     assert len(part.solid.pieces) <= 130
     kept = {(round(1e3 * float(w.point[0])), round(1e3 * w.radius, 2)) for w in part.solid.rounds.values()}
     assert (10, 1.5) in kept

@@ -13,7 +13,7 @@ from manifold3d import Manifold
 from apo_bench import InputError
 from apo_bench.cli.app import main
 from apo_bench.importers.cad import importing
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from tests.importers.cad.made import block, rod, write_stl, write_triangles
 
 
@@ -62,7 +62,7 @@ def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.
     (raw,) = raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
     monkeypatch.setattr(importing, "cut", None)
     with pytest.raises(InputError, match="no face of the part is flat or round"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")
 
 
 def shells(*given: Any) -> Any:
@@ -89,7 +89,7 @@ def test_a_solid_whose_surface_crosses_itself_becomes_no_part(tmp_path: Path) ->
     given[(given == (10, 10, 20)).all(axis=2)] = (0, 0, -10)
     _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
     with pytest.raises(InputError, match="its surface may cross itself"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")
 
 
 def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
 def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:
     mesh = block(30, 30, 5, (0, 0, -10)) + Manifold.sphere(10, 32)
     _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    done = import_part(raw, "ball", tmp_path, "a.stl")
+    done = import_solid(raw, "ball", tmp_path, "a.stl")
     assert sum(region.kind == "other" for region in raw.regions) == 1
     assert done.cut.hulls == 1
     assert done.solid.volume * 1e9 == pytest.approx(mesh.volume(), rel=0.1)

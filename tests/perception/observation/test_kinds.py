@@ -12,10 +12,16 @@ from apo_bench import Demonstration, Observation, draw_layout, load_scenario, ob
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import shared
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.outliers import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers
-from apo_bench.perception.observation.models.shared import CORRELATION, BiasView, Correlated
-from apo_bench.perception.observation.models.sighted import Sighted
-from apo_bench.perception.observation.models.symmetric import WORSE, Symmetric
+from apo_bench.perception.observation.models.outliers import (
+    MISSES,
+    OUTLIER_TIMES,
+    OUTLIERS,
+    UNSEEN_DEVIATION,
+    OutlierNoise,
+)
+from apo_bench.perception.observation.models.shared import CORRELATION, CorrelatedNoise, ViewBiasNoise
+from apo_bench.perception.observation.models.sighted import CameraNoise
+from apo_bench.perception.observation.models.symmetric import WORSE, SymmetricNoise
 from apo_bench.perception.observation.noise import Noise, NoiseLevel
 from tests import scenes
 
@@ -34,7 +40,7 @@ def twists(seen: Observation, scene: scenes.Scene = CYCLE) -> Array:
 def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     """Positions that were seen, in the frames of the true rays: what the twist does to them is not used."""
     camera = Camera(pose.at((0.5, -0.4, 0.6), (-140.0, 10.0, 50.0)))
-    noise = Sighted(NoiseLevel(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
+    noise = CameraNoise(NoiseLevel(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
     offsets = []
     turns = []
     for seed in range(600):
@@ -56,7 +62,7 @@ def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
     gross = []
     seen = []
     for seed in range(trials):
-        made = see(Outliers(NOISE_LEVEL), seed)
+        made = see(OutlierNoise(NOISE_LEVEL), seed)
         rng = np.random.default_rng(seed)
         rng.standard_normal((5, 6))
         gross.append(rng.random((5, 2))[:, 0] < OUTLIERS)
@@ -77,12 +83,12 @@ def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
 
 def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     """Move what is missed elsewhere: the observation stays the same, to the bit."""
-    seed = next(s for s in range(200) if not see(Outliers(NOISE_LEVEL), s).observed.all())
-    here = see(Outliers(NOISE_LEVEL), seed)
+    seed = next(s for s in range(200) if not see(OutlierNoise(NOISE_LEVEL), s).observed.all())
+    here = see(OutlierNoise(NOISE_LEVEL), seed)
     k = int(np.argmin(here.observed))
     goals = CYCLE.goals.copy()
     goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
-    there = see(Outliers(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
+    there = see(OutlierNoise(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.poses.tobytes() == there.poses.tobytes()
     assert_array_equal(here.covariance, there.covariance)
     assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
@@ -93,7 +99,7 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
     monkeypatch.setattr(shared, "OWN", 0.0)
     size = []
     for seed in range(400):
-        seen = see(BiasView(NOISE_LEVEL), seed)
+        seen = see(ViewBiasNoise(NOISE_LEVEL), seed)
         E = seen.poses @ pose.inverse(CYCLE.goals)
         middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
         assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
@@ -107,7 +113,7 @@ def test_errors_drift_from_operation_to_operation() -> None:
     A = Camera().T_world_camera[:3, :3]
     world = []
     for seed in range(800):
-        seen = see(Correlated(NOISE_LEVEL), seed)
+        seen = see(CorrelatedNoise(NOISE_LEVEL), seed)
         xi = twists(seen)
         R = seen.poses[:, :3, :3]
         world.append(np.concatenate([np.einsum("nij,nj->ni", R, half) @ A for half in (xi[:, :3], xi[:, 3:])], axis=1))
@@ -123,7 +129,7 @@ def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
     """Errors about the centre of volume: castles like isotropic ones, cube and stick worse about x alone."""
     centred = []
     for seed in range(800):
-        xi = twists(see(Symmetric(NOISE_LEVEL), seed))
+        xi = twists(see(SymmetricNoise(NOISE_LEVEL), seed))
         solids = [CYCLE.assembly.solids[o.main] for o in CYCLE.assembly.operations]
         to = np.array([pose.adjoint(pose.inverse(pose.at(solid.centroid))) for solid in solids])
         centred.append((to @ xi[..., None])[..., 0])
@@ -141,7 +147,7 @@ def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated()
     shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     lengths = []
     for seed in range(300):
-        seen = Symmetric(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
+        seen = SymmetricNoise(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.poses) @ layout.poses)
         lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
     assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)

@@ -18,8 +18,8 @@ from apo_bench.formats.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
-from apo_bench.perception.observation.models.empirical import Empirical, residuals_text
-from apo_bench.perception.observation.models.fitted import Fitted
+from apo_bench.perception.observation.models.empirical import EmpiricalNoise, residuals_text
+from apo_bench.perception.observation.models.fitted import FittedNoise
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -80,11 +80,11 @@ def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
 def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names: tuple[str, str]) -> None:
     unit, there = whitened(names[0], 800)
     noise = make_noise(names[0], NOISE_LEVEL)
-    if isinstance(noise, Fitted):
+    if isinstance(noise, FittedNoise):
         missed = noise.measured.missed
         outliers = noise.measured.outliers
     else:
-        assert isinstance(noise, Empirical)
+        assert isinstance(noise, EmpiricalNoise)
         missed = noise.sample.missed
         outliers = noise.sample.gross
         assert_allclose([missed, outliers], [WHOLE.missed, WHOLE.outliers], rtol=0.35)
@@ -176,7 +176,7 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     measured, camera = read_noise(presets()["megapose-lmo"])
     path.write_text(noise_text(measured, ("a note",)) + "[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
     noise = make_noise(str(path), NOISE_LEVEL)
-    assert isinstance(noise, Fitted)
+    assert isinstance(noise, FittedNoise)
     assert noise.measured == measured
     assert_allclose(noise.camera.T_world_camera, pose.at((0, 0, 1.5), (180, 0, 0)))
     assert_allclose(camera.T_world_camera, Camera().T_world_camera)

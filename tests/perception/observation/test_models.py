@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.isotropic import Isotropic, PerPart, part_factors
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise, PerPartNoise, part_factors
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from tests import scenes
 
@@ -27,8 +27,8 @@ def twists(seen: Observation, shown: Array) -> Array:
 
 def test_a_part_is_as_bad_in_every_operation() -> None:
     """The error of each operation is that of `isotropic` times the factor of the part it moves."""
-    plain = see(Isotropic(NOISE_LEVEL), 8)
-    seen = see(PerPart(NOISE_LEVEL), 8)
+    plain = see(IsotropicNoise(NOISE_LEVEL), 8)
+    seen = see(PerPartNoise(NOISE_LEVEL), 8)
     ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)

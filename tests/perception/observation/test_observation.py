@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR, floor_covariance
-from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
 
@@ -35,7 +35,7 @@ def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
     shown = replace(scenes.shown(TOWER), gap_m=3e-4, play_m=2e-4)
-    seen = observe(shown, Isotropic(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
+    seen = observe(shown, IsotropicNoise(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
     assert seen.assembly is shown.assembly
     assert dict(seen.start).keys() == dict(shown.start).keys()
     assert seen.observed.tolist() == [True, True, True]
@@ -49,12 +49,12 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
         return scenes.seen(TOWER, shown.poses)
 
-    assert make_noise("isotropic", noise_level) == Isotropic(noise_level)
-    assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", noise_level) == Isotropic(
-        noise_level
-    )
-    assert make_noise(Isotropic, noise_level) == Isotropic(noise_level)
-    assert make_noise(Isotropic(NoiseLevel(9.0, 9.0)), noise_level) == Isotropic(NoiseLevel(9.0, 9.0))
+    assert make_noise("isotropic", noise_level) == IsotropicNoise(noise_level)
+    assert make_noise(
+        "apo_bench.perception.observation.models.isotropic:IsotropicNoise", noise_level
+    ) == IsotropicNoise(noise_level)
+    assert make_noise(IsotropicNoise, noise_level) == IsotropicNoise(noise_level)
+    assert make_noise(IsotropicNoise(NoiseLevel(9.0, 9.0)), noise_level) == IsotropicNoise(NoiseLevel(9.0, 9.0))
     assert make_noise(plain, noise_level) is plain
     assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.goals)
 

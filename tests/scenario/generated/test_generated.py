@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import placements
+from apo_bench.assembly import compute_placements
 from apo_bench.errors import InputError
 from apo_bench.importers.assembly.touching import find_contacts
-from apo_bench.scenario import nominal_operations, scenario_path
-from apo_bench.scenario.generated import FAMILIES, generate_assembly, whole_name, write_generated
+from apo_bench.scenario import find_scenario_path, list_nominal_operations
+from apo_bench.scenario.generated import FAMILIES, complete_name, generate_assembly, write_generated
 from apo_bench.scenario.parts import load_part
 
 SMALL = (
@@ -56,8 +56,8 @@ def test_an_assembly_is_whole(family: str, seed: int) -> None:
 @given(seeds)
 @settings(max_examples=50)
 def test_a_plain_seed_names_one_of_a_family_that_is_not_held_out(seed: int) -> None:
-    name = whole_name(f"generated:{seed}")
-    assert whole_name(name) == name
+    name = complete_name(f"generated:{seed}")
+    assert complete_name(name) == name
     assert FAMILIES[name.split(":")[1]].weight > 0
 
 
@@ -72,13 +72,13 @@ def test_the_same_seed_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
 
 
 def test_ways_are_free(scenario: Scenario) -> None:
-    assert all(each.after.free for each in nominal_operations(scenario))
+    assert all(each.after.free for each in list_nominal_operations(scenario))
 
 
 def test_its_contacts_are_those_that_touch(scenario: Scenario) -> None:
     """Those that stand at the end are what `drafting` finds there."""
     assembly = scenario.assembly
-    end = placements(assembly, scenario.start, scenario.goals)[-1]
+    end = compute_placements(assembly, scenario.start, scenario.goals)[-1]
     said = {frozenset(each.contact) for each in assembly.relations() if each.lost is None}
     touching = {frozenset(contact) for contact in find_contacts(assembly.solids, end)}
     assert said == {pair for pair in touching if not {each.part for each in pair} <= assembly.fixed}
@@ -87,7 +87,7 @@ def test_its_contacts_are_those_that_touch(scenario: Scenario) -> None:
 @pytest.mark.parametrize("name", ["generated:grooves:2", "generated:rods:0", "generated:rods:2", "generated:castles:2"])
 def test_parts_are_as_their_files_say(name: str) -> None:
     """The loader leaves out this check of parts that it has just written."""
-    for path in scenario_path(name).parent.glob("*.xml"):
+    for path in find_scenario_path(name).parent.glob("*.xml"):
         load_part(path)
 
 

@@ -14,33 +14,33 @@ from apo_bench.scenario.parts.making import (
     Body,
     Frustum,
     bore,
+    build_solid,
     extrude,
     join,
-    polygon,
-    rectangle,
+    make_polygon,
+    make_rectangle,
+    make_shaft,
+    make_slot,
     revolve,
     round_corners,
-    shaft,
-    slot,
-    solid_of,
     write_part,
 )
 
 
 def plate() -> Body:
     hole = bore((5, -3), 5.1, 0, 20, "bore", fit=True, chamfer_high=0.5)
-    sides = rectangle(60, 40, names=("ny", "px", "py", "nx"))
+    sides = make_rectangle(60, 40, names=("ny", "px", "py", "nx"))
     return extrude(sides, 0, 20, bores=[hole], bottom="bottom", top="top")
 
 
 def base() -> Body:
     blind = [bore((x, y), 4.05, 5, 15, f"b{i}") for i, (x, y) in enumerate([(-30, 0), (0, 10), (30, 0)])]
     return extrude(
-        rectangle(120, 80),
+        make_rectangle(120, 80),
         0,
         15,
         bores=[*blind, bore((50, 30), 2, 0, 15)],
-        holes=[slot(30, 8, (0, -25), names=("s1", "s2", "s3", "s4"))],
+        holes=[make_slot(30, 8, (0, -25), names=("s1", "s2", "s3", "s4"))],
         top="top",
     )
 
@@ -51,8 +51,8 @@ def bush() -> Body:
 
 
 def pins() -> Body:
-    pin = shaft(4, 10, 20, "pin", chamfer_high=1, top="top")
-    plate = extrude(rectangle(60, 40), 0, 10, top="top")
+    pin = make_shaft(4, 10, 20, "pin", chamfer_high=1, top="top")
+    plate = extrude(make_rectangle(60, 40), 0, 10, top="top")
     return join(plate, *(pin.moved((x, 0, 0)).prefixed(side) for x, side in ((15, "right_"), (-15, "left_"))))
 
 
@@ -62,17 +62,21 @@ BODIES: Mapping[str, Body] = {
     "base": base(),
     "bush": bush(),
     "pins": pins(),
-    "peg": shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
-    "bracket": extrude(round_corners(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
-    "dovetail": extrude(polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40),
+    "peg": make_shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
+    "bracket": extrude(round_corners(make_polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
+    "dovetail": extrude(
+        make_polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40
+    ),
     "taper": revolve([Frustum(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
-    "stairs": join(extrude(rectangle(60, 40), 0, 10, top="tread"), extrude(rectangle(20, 40, (-20, 0)), 10, 30)),
+    "stairs": join(
+        extrude(make_rectangle(60, 40), 0, 10, top="tread"), extrude(make_rectangle(20, 40, (-20, 0)), 10, 30)
+    ),
 }
 
 
 @pytest.mark.parametrize("name", BODIES)
 def test_a_part_that_is_written_is_read_as_the_same_solid(name: str, tmp_path: Path):
-    wanted = solid_of(name, BODIES[name])
+    wanted = build_solid(name, BODIES[name])
     path = write_part(name, BODIES[name], tmp_path, density=2700.0, source="a test", licence="Apache-2.0")
     found = load_part(path)
     assert found.volume == pytest.approx(wanted.volume, rel=1e-9)

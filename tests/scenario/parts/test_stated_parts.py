@@ -11,20 +11,20 @@ import pytest
 
 from apo_bench import InputError, build_scene, load_scenario
 from apo_bench.resources import folder
-from apo_bench.scenario.parts import load_part, part_names, part_path, read_part
+from apo_bench.scenario.parts import find_part_path, list_part_names, load_part, read_part
 from apo_bench.scenario.parts.checking import check_part
-from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft, write_part
 
 MADE = join(
     extrude(
-        rectangle(40, 40, names=("ny", "px", "py", "nx")),
+        make_rectangle(40, 40, names=("ny", "px", "py", "nx")),
         0,
         10,
         bores=[bore((-8, 0), 3, 0, 10, "bore", fit=True)],
         bottom="bottom",
         top="top",
     ),
-    shaft(4, 10, 22, "pin", chamfer_high=1, top="tip").moved((10, 0, 0)),
+    make_shaft(4, 10, 22, "pin", chamfer_high=1, top="tip").moved((10, 0, 0)),
 )
 
 
@@ -128,15 +128,15 @@ def test_a_picture_is_shown_and_never_collides(part: Path, tmp_path: Path) -> No
     assert model.body("thing/").subtreemass == pytest.approx(2700.0 * load_part(part).volume, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", part_names())
+@pytest.mark.parametrize("name", list_part_names())
 def test_parts_of_the_package_are_as_they_say(name: str) -> None:
     """They are not held against their pieces each time that they are loaded."""
-    check_part(read_part(part_path(name)), load_part(name))
+    check_part(read_part(find_part_path(name)), load_part(name))
 
 
 def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_path: Path) -> None:
     for suffix in (".xml", ".toml"):
-        shutil.copy(part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
+        shutil.copy(find_part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
     mine = tmp_path / "mine.xml"
     first = read_part(mine)
     assert read_part(mine) is first
