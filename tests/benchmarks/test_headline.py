@@ -95,6 +95,6 @@ def test_the_summary_is_the_same_on_every_page_and_that_of_the_rows(page: Path) 
         written = text.split(BEGIN)[1].split(END)[0].strip()
         assert written == "\n".join(block(summary, *BLOCKS[page]))
     assert text.count(sentence(summary)) == 1
-    picture = re.search(r"!\[[^\]]*\]\(([^)]*headline\.png)\)", text)
+    picture = re.search(r"!\[[^\]]*\]\(([^)]*headline\.svg)\)", text)
     assert picture is not None
     assert (page.parent / picture.group(1)).exists()
