@@ -14,7 +14,7 @@ from tests.browser import browser, opened, overflow
 ROOT = Path(__file__).parents[2]
 PAGES = (
     *("index", "guide/environment", "guide/from-cad", "how/judge", "how/contact", "how/paper"),
-    *("results/headline", "results/arms", "reference/files", "reference/settings"),
+    *("results/headline", "results/arms", "reference/files", "reference/settings", "api/running", "api/environments"),
 )
 CUT = """() => [...document.querySelectorAll('pre > code, .md-typeset__scrollwrap, .formula')]
     .filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0).map(e => e.innerText.slice(0, 80))"""
@@ -56,17 +56,6 @@ def test_formulas_become_mathml_in_lines_and_alone(hooks: Any) -> None:
     assert "&#x0003C;" in inline
     assert alone.startswith('<div class="formula"><math ')
     assert 'display="block"' in alone
-
-
-def test_short_names_are_marked_as_whole(hooks: Any) -> None:
-    text = "<td><code>--robot-error</code> <code>two words</code></td>"
-    marked = hooks.on_page_content(text, None, None, None)
-    assert marked == text.replace("<code>--", '<code class="whole">--')
-
-
-def test_what_is_no_formula_stays(hooks: Any) -> None:
-    text = "<pre><code>echo $HOME costs $5</code></pre>"
-    assert hooks.on_page_content(text, None, None, None) == text
 
 
 @pytest.mark.slow

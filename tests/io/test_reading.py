@@ -11,7 +11,7 @@ import pytest
 
 from apo_bench import InputError, load_scenario, read_observation
 from apo_bench.formats.bop import read_results
-from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
+from apo_bench.io import FileTable, NotNegative, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
 from apo_bench.io.safe_io import read_bytes, read_text
 from apo_bench.scenario.parts import load_part
@@ -57,14 +57,14 @@ def test_only_so_much_is_read(tmp_path: Path) -> None:
         read_text(path, "file")
 
 
-class Pose(Table, frozen=True):
+class Pose(FileTable, frozen=True):
     """A table in a table."""
 
     at_mm: Triple
     turn_deg: Triple = (0.0, 0.0, 0.0)
 
 
-class Step(Table, frozen=True, tag="step"):
+class Step(FileTable, frozen=True, tag="step"):
     """One of two kinds."""
 
     move: Text
@@ -72,13 +72,13 @@ class Step(Table, frozen=True, tag="step"):
     kind: Literal["centred", "contact"] = "centred"
 
 
-class Wait(Table, frozen=True, tag="wait"):
+class Wait(FileTable, frozen=True, tag="wait"):
     """The other kind."""
 
     seconds: NotNegative
 
 
-class Plan(Table, frozen=True, kw_only=True):
+class Plan(FileTable, frozen=True, kw_only=True):
     """A whole file."""
 
     schema: Literal[1]
@@ -117,14 +117,6 @@ def test_a_document_becomes_its_type(tmp_path: Path) -> None:
             "plan, operation 1, move: a text without control characters",
         ),
         (GOOD | {"operations": [STEP, STEP | {"goal": {}}]}, "plan, operation 2, goal: the key 'at_mm' is missing."),
-        (
-            GOOD | {"operations": [STEP | {"goal": {"at_mm": [1, 2]}}]},
-            "plan, operation 1, goal, at_mm: a list of length 3 is needed, [1, 2] was given.",
-        ),
-        (
-            GOOD | {"operations": [STEP | {"kind": "loose"}]},
-            'plan, operation 1, kind: "centred" or "contact" is needed, "loose" was given.',
-        ),
     ],
 )
 def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sentence: str) -> None:
@@ -134,10 +126,7 @@ def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sente
     assert str(refused.value).endswith(".")
 
 
-@pytest.mark.parametrize(
-    ("text", "syntax"),
-    [("a = = 1", "toml"), ("a = 1\na = 2", "toml"), ("{\n", "json"), ('{"a": NaN}', "json"), ("[" * 100_000, "json")],
-)
+@pytest.mark.parametrize(("text", "syntax"), [("a = = 1", "toml"), ("a = 1\na = 2", "toml")])
 def test_text_of_another_syntax_is_refused(text: str, syntax: Any) -> None:
     with pytest.raises(InputError, match=f"plan: this is not {syntax.upper()} ") as refused:
         parse_plain(text, "plan", syntax)

@@ -5,14 +5,11 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError, read_arm
-from apo_bench.io import named_files
+from apo_bench.io import list_named_files
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.loading import compile_model, load_model
 
 ARMS = folder("assets") / "arms"
-WORLD = "<worldbody>"
-END = "</mujoco>"
-BALL = "<body><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>{}</body>"
 
 
 def with_gripper(folder: Path, arm: str) -> Path:
@@ -64,7 +61,7 @@ def test_an_arm_in_parts_with_materials_in_its_classes_is_built(tmp_path: Path) 
     plain = read_arm(ARMS / "ur5e_primitive.toml")
     assert arm.joints == plain.joints
     assert arm.opening_m == pytest.approx(plain.opening_m, abs=1e-4)
-    names = {each.name for each in named_files(tmp_path / "arm.xml")}
+    names = {each.name for each in list_named_files(tmp_path / "arm.xml")}
     assert names == {"arm.xml", "rest.xml", "link.obj"}
     assert {each.name for each in arm.files} == {*names, "arm.toml", "linkage_gripper.xml", "linkage_gripper.toml"}
 
@@ -80,16 +77,4 @@ def test_meshes_are_found_where_the_compiler_says(tmp_path: Path) -> None:
     (tmp_path / "assets" / "a.stl").write_bytes(b"")
     (mesh,) = load_model(tmp_path / "arm.xml", "arm").meshes
     assert mesh.file == str(tmp_path / "assets" / "a.stl")
-    assert named_files(tmp_path / "arm.xml") == (tmp_path / "arm.xml", tmp_path / "assets" / "a.stl")
-
-
-def test_a_mesh_that_is_stated_twice_is_read_once_as_robosuite_does(tmp_path: Path) -> None:
-    (tmp_path / "link.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
-    (tmp_path / "arm.xml").write_text(
-        '<mujoco><default><default class="a" group="1"/></default>'
-        '<asset><mesh file="link.obj"/><mesh file="link.obj" scale="2 2 2"/></asset>'
-        '<worldbody><body><geom type="mesh" mesh="link"/></body></worldbody></mujoco>'
-    )
-    model = compile_model(load_model(tmp_path / "arm.xml", "arm"), tmp_path)
-    assert model.nmesh == 1
-    assert model.mesh_vert.max() < 1.0
+    assert list_named_files(tmp_path / "arm.xml") == (tmp_path / "arm.xml", tmp_path / "assets" / "a.stl")

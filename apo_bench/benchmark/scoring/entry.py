@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.benchmark.analysis import Results, pooled_rate
+from apo_bench.benchmark.analysis import Results, pool_rate
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import UNSHOWN, read_bytes, write_file
@@ -96,7 +96,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 100.0 * right / self.executed if self.executed else None
 
 
-class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a method scored.
 
     Raises:
@@ -116,6 +116,8 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Of the packages that matter, and of Python."""
     machine: Name
     tracks: Annotated[Mapping[Name, TrackScore], Meta(min_length=1, max_length=50)]
+    real: bool = False
+    """Whether the trials were made with a real robot and reported in a form."""
 
     def __post_init__(self) -> None:
         shown = (self.name, self.method, self.command, self.machine, *self.tracks)
@@ -184,7 +186,7 @@ def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
     seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
     success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
     results = Results(np.arange(len(seeds)), seeds, success.astype(float))
-    low, high = pooled_rate(results).interval
+    low, high = pool_rate(results).interval
     return score, min(100.0 * low, score), max(100.0 * high, score)
 
 

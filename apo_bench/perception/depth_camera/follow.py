@@ -8,15 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turn_alike
+from apo_bench.geometry import (
+    Array,
+    find_least_turned,
+    find_nearest_symmetric_pose,
+    find_symmetries,
+    pose,
+    shrink_pieces,
+)
 from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.perception.depth_camera.rays import RayCaster
-from apo_bench.perception.depth_camera.regions import Regions, find_regions
+from apo_bench.perception.depth_camera.regions import Regions, find_changed_regions
 from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
 
 _GONE = 0.5
-"""A part has moved if so much of what was seen of it has vanished."""
+"""A part has moved if so much of what was observed of it has vanished."""
 _GRID = 3
 """Every so many pixels are looked up."""
 
@@ -52,7 +59,7 @@ class Expected:
     assembly: Assembly
     start: Poses
     turns: Array
-    """(n, 3, 3), the planned rotation of each goal, world; how the whole is turned is learnt from the first part."""
+    """(n, 3, 3), the planned rotation of each pose, world; the turn of the whole is learnt from the first part."""
     play_m: float = 0.0
     """Clearance per side: the models are the parts as they are made."""
 
@@ -65,12 +72,12 @@ def follow_demonstration(
     An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
     what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
     this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
-    pause of the hand looks the same as the end of an operation, so the others are not seen.
+    pause of the hand looks the same as the end of an operation, so the others are not observed.
     """
     assembly = expected.assembly
     believed = {part: expected.start[part] for part in assembly.solids}
     surfaces = {
-        part: sample_surface(physical_pieces(solid, expected.play_m))
+        part: sample_surface(shrink_pieces(solid, expected.play_m))
         for part, solid in assembly.solids.items()
         if part not in assembly.fixed
     }
@@ -93,7 +100,7 @@ def follow_demonstration(
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = turn_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
+            T = find_least_turned(solid, find_nearest_symmetric_pose(located.T, find_symmetries(solid), turn), turn)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
             located = LocatedModel(T, _turn_covariance(located, T), located.explained)
@@ -115,12 +122,12 @@ def _spell(
 ) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
     """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
 
-    Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
-    a row that move the same parts it is the last, since the spell ends when something else moves.
+    Operation k is looked for first; one that moves something else may come instead, if k was not observed. Of
+    consecutive operations that move the same parts it is the last, since the spell ends when something else moves.
     """
     spell = None
     for last in range(first + 1, len(images)):
-        compared = tuple(find_regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
+        compared = tuple(find_changed_regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
         moved = _find_gone(owners, tuple(assembly.solids), compared) - assembly.fixed
         if not moved:
             continue
@@ -180,7 +187,7 @@ def _find_model(
 
 
 def _model_alone(assembly: Assembly, surfaces: Mapping[str, Surface], part: str) -> Model:
-    return Model({part: np.eye(4)}, surfaces[part], symmetries(assembly.solids[part]))
+    return Model({part: np.eye(4)}, surfaces[part], find_symmetries(assembly.solids[part]))
 
 
 def _moving_model(assembly: Assembly, surfaces: Mapping[str, Surface], believed: Poses, which: int) -> Model:

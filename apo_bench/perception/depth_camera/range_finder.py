@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
@@ -26,7 +26,7 @@ class PinholeView:
     """Vertical opening angle."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_world_view", frozen(self.T_world_view, 4, 4))
+        object.__setattr__(self, "T_world_view", copy_frozen(self.T_world_view, 4, 4))
 
     @property
     def origin(self) -> Array:
@@ -42,7 +42,7 @@ class PinholeView:
         x = (u + 0.5 - self.width / 2) / focal
         y = (v + 0.5 - self.height / 2) / focal
         rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
-        return frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+        return copy_frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 class RangeImage(NamedTuple):
@@ -66,9 +66,9 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
 
 @lru_cache(maxsize=4)
 def _two_views() -> tuple[PinholeView, ...]:
-    """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
+    """From the left in front and from the right behind, 45 degrees high: together they cover every side of a part.
 
-    One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
+    One view is not enough: of a stick that lies in a tower only its ends are visible, and only one of them from
     either side. At 0.95 m a pixel is 3 mm wide.
     """
     reach = 0.67

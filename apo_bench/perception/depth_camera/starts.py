@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from apo_bench.geometry import Array, quarter_turns
+from apo_bench.geometry import Array, list_quarter_turns
 
 _EDGE = 0.01
 """Share of the points beyond either end of their extent: noise makes regions larger than parts."""
@@ -14,7 +14,7 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
     """Poses (s, 4, 4) of a shape whose visible surface may be the points (n, 3), world, [m].
 
     The smallest rectangle around the points, seen from above, says how the sides of a part that stands on one of its
-    sides are turned; of the 24 ways to put a box on a table those that look alike are tried once. The part is put in
+    sides are turned; of the 24 ways to put a box on a table those that look the same are tried once. The part is put in
     the middle of the rectangle, and as high as the points reach.
 
     Args:
@@ -26,7 +26,7 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
     s = np.sin(turn)
     Z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     low, high = np.quantile(points @ Z, (_EDGE, 1.0 - _EDGE), axis=0)
-    turns = keep_distinct(quarter_turns(), same)
+    turns = keep_distinct(list_quarter_turns(), same)
     T = np.tile(np.eye(4), (len(turns), 1, 1))
     for start, R in zip(T, turns, strict=True):
         turned = corners @ R.T

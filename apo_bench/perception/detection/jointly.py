@@ -1,7 +1,7 @@
 """Detect contacts and estimate poses together: of many sets of contacts the one that explains the poses best.
 
 Operation by operation, pairs of faces that may touch are taken or refused, the surest first; each set is scored with
-the poses that it asks for (`estimate`), by how much better it explains what was seen than chance does, less what it
+the poses that it asks for (`estimate`), by how much better it explains what was observed than chance does, less what it
 takes for granted: relations beyond the first, and what physics forbids. The best few sets go on to the next operation,
 which may turn the order round: a stick that fits through two castles says how these were stacked.
 """
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Contact, Observation, placements
+from apo_bench.assembly import Assembly, Contact, Observation, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.candidate import Candidate
 from apo_bench.perception.detection.estimate import estimate
@@ -24,7 +24,7 @@ from apo_bench.perception.detection.evidence import (
     DetectedContacts,
     Rival,
     collect_evidence,
-    with_contacts,
+    keep_evident_contacts,
     without_contacts,
 )
 from apo_bench.perception.detection.physics import IMPOSSIBLE, inside, physical_surprise, refusal
@@ -167,12 +167,12 @@ class _Search:
         return min(self._open(partial), key=lambda c: (c.distance - c.gain, c.contact), default=None)
 
     def _rival(self, partial: _Partial, taking: _Partial) -> float:
-        """What the best of the pairs promises that one more contact puts out of the question, at most 0."""
+        """What the best of the pairs predicts that one more contact puts out of the question, at most 0."""
         left = {c.contact for c in (*self._open(taking), *taking.taken)}
         return min([0.0, *(c.distance - c.gain for c in self._open(partial) if c.contact not in left)])
 
     def _rare(self, partial: _Partial, c: Candidate) -> float:
-        """What it takes for granted that this pair touches, beside those that were taken."""
+        """What it takes for granted that this pair touches, in addition to those that were taken."""
         related = {before.parts for before in partial.taken}
         return _RELATION if related and c.parts not in related else 0.0
 
@@ -207,7 +207,7 @@ def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
     """The best of the histories, with how likely it is, and the next best one."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
-    is_uncorrected = placements(seen.assembly, seen.start, seen.poses)
+    is_uncorrected = compute_placements(seen.assembly, seen.start, seen.poses)
     evidence = [
         [
             each
@@ -216,5 +216,5 @@ def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
         ]
         for history in kept[:2]
     ]
-    rival = Rival(with_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
-    return DetectedContacts(with_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)
+    rival = Rival(keep_evident_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
+    return DetectedContacts(keep_evident_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)

@@ -8,7 +8,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Facing, Observation
+from apo_bench.assembly import Contact, FacingPair, Observation
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.detection.belief import Belief, PartBeliefs
@@ -52,7 +52,7 @@ class Situation:
         return Belief(known.assembly, self.seen.start, known.poses, known.covariance).standing(self.k)
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """A part that was moved and one that stands there, both where something was seen."""
+        """A part that was moved and one that stands there, both where something was observed."""
         for a in self.moves:
             for b in self.others:
                 if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
@@ -81,7 +81,7 @@ class Situation:
                 candidates += self._judged(rules, a, b, pair)
         return tuple(candidates)
 
-    def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
+    def _judged(self, rules: Rules, a: str, b: str, pair: FacingPair) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         J = pair.slope @ self._reach(a, b)
         C = J @ self.estimate.covariance @ J.T
@@ -108,5 +108,5 @@ class Situation:
         return pair_thresholds(rules, worst, loose)
 
     def _reach(self, a: str, b: str) -> Array:
-        """(6, 6 n): the world twist of part a beside part b that body twists of the poses make."""
+        """(6, 6 n): the world twist of part a relative to part b that body twists of the poses make."""
         return self.now.reach[a] - self.now.reach[b]

@@ -13,19 +13,19 @@ _ARM = np.array([-420.0, 0.0])
 """Where the arm that comes with the benchmark stands; it reaches the table between two distances."""
 _REACH = (285.0, 640.0)
 _LEAST_ASIDE = 110.0
-"""Nothing waits between the arm and the site, where its links pass."""
+"""No part starts between the arm and the site, where its links pass."""
 _CENTER = 95.0
 _YAW_DEG = 20.0
 _SPREAD_X = (5.0, 30.0)
 _SPREAD_Y = (5.0, 40.0)
 _ROOM = np.array([36.0, 58.0])
-"""Between what waits: fingers close across y."""
+"""Between parts at their starts: fingers close across y."""
 _BESIDE = 45.0
-"""Between what waits and wherever the site may be."""
+"""Between parts at their starts and wherever the site may be."""
 _GRID = 6.0
 
 
-class Table(NamedTuple):
+class TableLayout(NamedTuple):
     """How the table is laid."""
 
     starts: Mapping[str, tuple[float, float, float]]
@@ -34,8 +34,8 @@ class Table(NamedTuple):
     yaw_deg: float
 
 
-def lay(made: GeneratedAssembly, rng: np.random.Generator) -> Table:
-    """Draw where parts wait.
+def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
+    """Draw where parts start.
 
     Raises:
         RuntimeError: There is no room for all of them.
@@ -65,7 +65,7 @@ def lay(made: GeneratedAssembly, rng: np.random.Generator) -> Table:
         at = np.round(places[int(np.argmax(free))], 1)
         taken.append((at - size, at + size))
         starts[part] = (*(at - (low + high) / 2).round(3).tolist(), 0.0)
-    return Table(starts, (_CENTER, 0.0), spread, _YAW_DEG)
+    return TableLayout(starts, (_CENTER, 0.0), spread, _YAW_DEG)
 
 
 def _grid() -> Array:

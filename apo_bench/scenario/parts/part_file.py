@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
+from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, make_cylinder_hull
 from apo_bench.scenario.parts.allowed import (
     DENSITY,
     LARGEST_M,
@@ -32,7 +32,7 @@ _AUTOMATIC = "auto_"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Mark:
+class NamedSite:
     """A site: the face on which it lies gets its name."""
 
     name: str
@@ -44,15 +44,15 @@ class Mark:
 @final
 @dataclass(frozen=True, eq=False)
 class PartFile:
-    """What a part file says, with the file beside it."""
+    """What a part file says, with the file next to it."""
 
     path: Path
     pieces: tuple[Piece, ...]
     """Named and ordered as the geoms."""
-    marks: tuple[Mark, ...]
+    marks: tuple[NamedSite, ...]
     """Of boxes alone."""
     stated: StatedPart | None
-    """What stands beside it; None of boxes alone."""
+    """What stands next to it; None of boxes alone."""
     density: float
     """[kg/m^3]."""
     model: "PartModel"
@@ -60,16 +60,16 @@ class PartFile:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the part is made of: its part file, the picture that this names, and the file beside it."""
+        """The files that the part is made of: its part file, the picture that this names, and the file next to it."""
         pictures = () if self.model.picture is None else (self.model.picture.file,)
         return self.path, *pictures, *(() if self.stated is None else (self.path.with_suffix(".toml"),))
 
 
 def read_part(path: Path) -> PartFile:
-    """Read a part file; once, as long as it and the file beside it stay as they are.
+    """Read a part file; once, as long as it and the file next to it stay as they are.
 
     Raises:
-        InputError: The file cannot be read, or is not one body of named pieces; or so the one beside it.
+        InputError: The file cannot be read, or is not one body of named pieces; or so the one next to it.
     """
     return _kept(path, _stamp(path), _stamp(path.with_suffix(".toml")))
 
@@ -112,7 +112,7 @@ def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFi
     )
     for site in model.sites:
         require(not site.name.startswith(_AUTOMATIC), f"{path}: site '{site.name}': {_AUTOMATIC} is kept for others.")
-    marks = tuple(Mark(site.name, site.pos, site.default == _FIT_CLASS) for site in model.sites)
+    marks = tuple(NamedSite(site.name, site.pos, site.default == _FIT_CLASS) for site in model.sites)
     return PartFile(path, tuple(pieces), marks, None, min(densities), model)
 
 
@@ -133,4 +133,4 @@ def _piece(path: Path, geom: "PartGeom") -> Piece:
     require(size[0] <= WIDEST_M, f"{place} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.")
     length = float(np.linalg.norm(geom.axis))
     require(length >= _SHORTEST_AXIS, f"{place} has a zaxis= of no length; give a direction.")
-    return cylinder_hull(geom.name, Cylinder(geom.pos, geom.axis / length, float(size[0]), float(size[1])))
+    return make_cylinder_hull(geom.name, Cylinder(geom.pos, geom.axis / length, float(size[0]), float(size[1])))

@@ -12,8 +12,8 @@ from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
-from apo_bench.simulation.robot import TINY_S, Moving, Trajectory, near_spans, take_along
-from apo_bench.simulation.scene import HANDS, Scene, allow_sleep, initial_state, part_pose
+from apo_bench.simulation.robot import TINY_S, MovingPieces, Trajectory, find_near_spans, take_along
+from apo_bench.simulation.scene import HANDS, Scene, allow_sleep, get_part_pose, make_initial_state
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
@@ -39,7 +39,7 @@ class Hands:
     def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
         self.scene = scene
         self.world = scene.shown
-        self.data: Any = initial_state(self.world, start)
+        self.data: Any = make_initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
         self._hooks = as_hooks(watch)
         self._operation: int | None = None
@@ -61,7 +61,7 @@ class Hands:
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""
-        return part_pose(self.world, self.data, part)
+        return get_part_pose(self.world, self.data, part)
 
     def grab(self, hand: int, part: str) -> Array:
         """Take a part where it is, at its frame; returns its pose.
@@ -120,6 +120,7 @@ class Hands:
                 return self._pass(steps - done, lambda data, i: None)
             self._step(min(_LOOK_STEPS, steps - done))
 
+<<<<<<< HEAD
     def _spans(self, hand: int, line: Trajectory, n: int, begun: int) -> list[tuple[int, int]]:
         """Which steps of a line that is begun are simulated: those where something is near; at last the end."""
         s = line.progress(_trailing(np.arange(begun, n + 1.0), n, self._step_s))
@@ -127,6 +128,15 @@ class Hands:
         moving = [Moving(self.scene.pieces[part], T) for part, T in held.items()]
         spans = near_spans(self.scene, self.data, moving, tuple(held), line, s, self.world, _RUN_UP_S, _NEAR_M)
         spans = [(begun + begin, begun + end) for begin, end in spans]
+=======
+    def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
+        """Which steps of a line are simulated: those where something is near; at last the end."""
+        tip = pose.inverse(line.start)
+        held = tuple(self._held[hand])
+        moving = [MovingPieces(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
+        s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
+        spans = find_near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
+>>>>>>> int
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _fast_forward(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
@@ -135,7 +145,7 @@ class Hands:
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
         for part, T_hand_part in self._held[hand].items():
             # Where the hand would be that has the part where it is: the part trails behind the real one.
-            before = part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
+            before = get_part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
             take_along(self.world, data, (part,), (before, after, later))
         self._put(data, hand, line.poses(line.progress(at[:1] / n))[0])
 

@@ -12,15 +12,15 @@ from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
 from apo_bench.planning.insertion.arrival import Arrival, arrive
 from apo_bench.planning.insertion.attach import Preference
-from apo_bench.planning.insertion.macros import Chain, Way, chain, departure, peel
+from apo_bench.planning.insertion.macros import Chain, StraightExit, chain, departure, peel
 from tests import scenes
 
 X, Y, Z = np.eye(3)
 
 
-def out(along: Array, walls: tuple[int, ...]) -> Way:
+def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
     """Along the first axis there is, a decimetre."""
-    return Way(along[0], 0.1, True)
+    return StraightExit(along[0], 0.1, True)
 
 
 def made(*normals: Array) -> Chain:
@@ -121,18 +121,6 @@ def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:
         right=(scenes.block(), scenes.mm(0, -50, height_mm)),
         part=(scenes.block(), scenes.mm(0, 0, height_mm)),
     )
-
-
-def test_a_block_between_two_walls_comes_from_above_unless_told_otherwise() -> None:
-    found = arrival(between())
-    (macro,) = found.macros
-    assert (found.state.letter, macro.name, macro.direction.tolist()) == ("B", "insert-between", [0, 0, -1])
-    assert macro.length_m == pytest.approx(0.05)
-    assert (found.line.travel_m, found.free) == (pytest.approx(0.07), True)
-    (noise_level,) = arrival(between(), Preference(X)).macros
-    assert (noise_level.name, noise_level.direction.tolist()) == ("insert-between", [1, 0, 0])
-    through = arrival(between(), Preference(Y))
-    assert through.macros[0].direction.tolist() == [0, 0, -1], "a line through a wall is not followed"
 
 
 def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from apo_bench.benchmark.analysis import percent, percents
+from apo_bench.benchmark.analysis import format_percent, format_percent_interval
 
 
 class Section(NamedTuple):
@@ -25,6 +25,8 @@ class Section(NamedTuple):
     heading: str
     blocks: Sequence[tuple[str, Any]]
     """What stands in it, each with the name of the macro of the template that shows it."""
+    open: bool = False
+    """Whether it is unfolded when the page opens."""
 
 
 def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:
@@ -78,7 +80,13 @@ def _template() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"prose": prose, "zip": zip, "svg": _svg, "percent": percent, "percents": percents}
+    environment.filters |= {
+        "prose": prose,
+        "zip": zip,
+        "svg": _svg,
+        "percent": format_percent,
+        "percents": format_percent_interval,
+    }
     return environment.get_template("report.html.j2")
 
 

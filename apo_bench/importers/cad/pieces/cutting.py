@@ -14,7 +14,7 @@ from apo_bench.importers.cad.pieces.halving import convex_parts, cut_at_shoulder
 from apo_bench.importers.cad.pieces.holes import bore_piece, least_pieces
 from apo_bench.importers.cad.pieces.refining import Beside
 from apo_bench.importers.cad.pieces.shafts import as_cylinders, round_shafts
-from apo_bench.importers.cad.solids import RawSolid, Region, body_of
+from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
 from apo_bench.scenario.parts.allowed import MOST_PIECES
 from apo_bench.scenario.parts.checking import touching_groups
 
@@ -48,7 +48,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
-    body = body_of(raw.mesh)
+    body = convert_to_manifold(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
@@ -74,7 +74,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
         hulls += abs(coarse_volume - true + kept_volume - fine_volume) > _LOSS * true
         outlines.append(corners)
     kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
-    # Holes of screws that nobody drew: of too many holes, those that nothing comes near to are filled.
+    # Holes of screws that were not drawn: of too many holes, those that nothing comes near to are filled.
     while others is not None and kept and least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
         kept.pop()
     pieces = _bore(outlines, kept, flats)
