@@ -56,8 +56,7 @@ def measure_intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     return max(0.0, float(measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b, 0.0)[0]))
 
 
-<<<<<<< HEAD
-def intrusion_depths(
+def measure_intrusion_depths(
     a: tuple[Piece, ...],
     R_a: Array,
     at: Array,
@@ -65,10 +64,6 @@ def intrusion_depths(
     T_b: Array,
     apart_m: float = np.inf,
     measured_m: float = 0.0,
-=======
-def measure_intrusion_depths(
-    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
->>>>>>> int
 ) -> Array:
     """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
 

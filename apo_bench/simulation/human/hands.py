@@ -120,23 +120,13 @@ class Hands:
                 return self._pass(steps - done, lambda data, i: None)
             self._step(min(_LOOK_STEPS, steps - done))
 
-<<<<<<< HEAD
     def _spans(self, hand: int, line: Trajectory, n: int, begun: int) -> list[tuple[int, int]]:
         """Which steps of a line that is begun are simulated: those where something is near; at last the end."""
         s = line.progress(_trailing(np.arange(begun, n + 1.0), n, self._step_s))
         held = self._held[hand]
-        moving = [Moving(self.scene.pieces[part], T) for part, T in held.items()]
-        spans = near_spans(self.scene, self.data, moving, tuple(held), line, s, self.world, _RUN_UP_S, _NEAR_M)
+        moving = [MovingPieces(self.scene.pieces[part], T) for part, T in held.items()]
+        spans = find_near_spans(self.scene, self.data, moving, tuple(held), line, s, self.world, _RUN_UP_S, _NEAR_M)
         spans = [(begun + begin, begun + end) for begin, end in spans]
-=======
-    def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
-        """Which steps of a line are simulated: those where something is near; at last the end."""
-        tip = pose.inverse(line.start)
-        held = tuple(self._held[hand])
-        moving = [MovingPieces(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
-        s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
-        spans = find_near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
->>>>>>> int
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _fast_forward(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:

@@ -47,15 +47,8 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
             shift = wanted @ pose.inverse(now)
             velocity = np.array(data.qvel)
             for part in carried.parts:
-<<<<<<< HEAD
-                set_part_pose(world, data, part, shift @ part_pose(world, data, part))
-            data.qvel[:] = velocity
-=======
-                v = world.dof[part]
-                velocity = np.array(data.qvel[v : v + 6])
                 set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
-                data.qvel[v : v + 6] = velocity
->>>>>>> int
+            data.qvel[:] = velocity
             return carried
     return carried._replace(T_tip_part=pose.inverse(T_world_tip) @ now)
 

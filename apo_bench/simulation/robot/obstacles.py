@@ -128,16 +128,9 @@ def _near(
             look = may[:, i] & ~near
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
-<<<<<<< HEAD
                 T = obstacles[i].T
-                depths = intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, T, margin, margin)
+                depths = measure_intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, T, margin, margin)
                 near[look] = depths > -margin
-=======
-                near[look] = (
-                    measure_intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
-                    > -margin
-                )
->>>>>>> int
     return near
 
 
