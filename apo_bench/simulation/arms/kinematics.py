@@ -92,10 +92,22 @@ class Kinematics:
 
     def jacobian(self, q: Array) -> Array:
         """The body Jacobian of the tip, (6, joints): its twist in its own frame, [m, rad], per radian of each joint."""
-        self._full[self.adr] = q
-        self.configuration.update(self._full)
-        whole = self.configuration.get_frame_jacobian(str(self.model.site(self.site).name), "site")
-        return np.asarray(whole[:, self.model.jnt_dofadr[self.ids]])
+        self.forward(q)
+        return self._jacobian()[:, self.model.jnt_dofadr[self.ids]]
+
+    def inverse_jacobian(self, q: Array) -> Array:
+        """How the joints turn with the tip, (joints, 6), [rad] per [m, rad] of a twist in its own frame.
+
+        An arm of five joints keeps the place of the tip before its turn, as `inverse` does.
+        """
+        return np.asarray(np.linalg.pinv(self._cost * self.jacobian(q)) * self._cost[:, 0])
+
+    def _jacobian(self) -> Array:
+        """The body Jacobian of the tip where `mj_kinematics` found it, (6, all joints of the model)."""
+        data = self.configuration.data
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_jacSite(self.model, data, self._J[0], self._J[1], self.site)
+        return np.asarray((data.site_xmat[self.site].reshape(3, 3).T @ self._J).reshape(6, -1))
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
         """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there.
@@ -139,10 +151,7 @@ class Kinematics:
         """
         # The least of 1/2 s^T H s - c^T s with H = J^T W J and c = J^T W error: without limits H s = c. A little
         # damping on the diagonal keeps H regular where the arm is straight.
-        data = self.configuration.data
-        mujoco.mj_comPos(self.model, data)
-        mujoco.mj_jacSite(self.model, data, self._J[0], self._J[1], self.site)
-        J = self._cost * (data.site_xmat[self.site].reshape(3, 3).T @ self._J).reshape(6, -1)
+        J = self._cost * self._jacobian()
         H = J.T @ J + self._damping
         c = (self._cost[:, 0] * error) @ J
         if self._posture is not None:
@@ -150,7 +159,7 @@ class Kinematics:
             H = H + more[0]
             c = c - more[1]
         step: Array = np.linalg.solve(H, c)
-        low, high = self.GAIN * (self._range - data.qpos)
+        low, high = self.GAIN * (self._range - self.configuration.data.qpos)
         if (step >= low).all() and (step <= high).all():
             return step
         self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))

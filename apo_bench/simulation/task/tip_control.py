@@ -206,7 +206,7 @@ class TipControl:
         R = T[:3, :3]
         w = R.T @ self._R @ (self._turn - off[3:]) / PERIOD_S
         twist = np.concatenate([np.cross(w, -self._front), w])
-        back = np.linalg.pinv(robot.scene.kinematics.jacobian(robot.q))
+        back = robot.scene.kinematics.inverse_jacobian(robot.q)
         turning = back @ twist
         shifting = back[:, :3] @ R.T
         q = robot.q
