@@ -62,4 +62,4 @@ def under_roof(angle_deg: float = 30.0) -> Scene:
     contacts = touch("wedge", "table", "bottom-top") + touch("wedge", "roof", "slope-slope")
     made = scene([table(), slope, rounds.wedge(angle_deg=angle_deg)], [Operation("wedge", contacts)], [mm(0, 0, 0)])
     of = replace(made.assembly, fixed=frozenset({"table", "roof"}))
-    return Scene(of, {**made.start, "roof": turned}, made.goals)
+    return Scene(of, {**made.start, "roof": turned}, made.nominal_poses)

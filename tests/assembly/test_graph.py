@@ -84,10 +84,10 @@ def test_every_arc_is_in_the_graph_with_its_equations(name: str) -> None:
 @pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])
 def test_arcs_hold_at_the_truth_and_the_worst_is_the_gap(name: str) -> None:
     scene = scenes.ALL[name]()
-    seen = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
-    for step in range(1, len(scene.goals) + 1):
+    seen = scenes.noisy(scene.nominal_poses, np.random.default_rng(3), 1.0, 1.0)
+    for step in range(1, len(scene.nominal_poses) + 1):
         graph = build_relation_graph(scene.assembly, step)
         done = scene.assembly.first(step)
-        assert max(compute_arc_residuals(scene.assembly, scene.start, scene.goals, graph)) < 1e-12
+        assert max(compute_arc_residuals(scene.assembly, scene.start, scene.nominal_poses, graph)) < 1e-12
         worst = max(compute_arc_residuals(scene.assembly, scene.start, seen, graph))
         assert worst == pytest.approx(measure_largest_gap(done, scene.start, seen[:step]), rel=1e-9)

@@ -43,7 +43,7 @@ def test_the_newest_motion_parameter_alone_does_not_suffice(name: str) -> None:
 
 def test_where_the_newest_suffices_it_is_tracking() -> None:
     scene = scenes.fixture_alignment()
-    given = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(2), 1.0, 1.0))
+    given = scenes.seen(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(2), 1.0, 1.0))
     mine, whole = last_only(given), paper_track(given)
     assert (mine.tried, mine.schedule, mine.freed) == (whole.tried, whole.schedule, whole.freed)
     assert_array_equal(mine.poses, whole.poses)

@@ -109,7 +109,7 @@ def _castle_aside(folder: Path, mm: float) -> Path:
 
     scenario = load_scenario("stick_in_tower")
     n = len(scenario.assembly)
-    poses = np.array(scenario.goals)
+    poses = np.array(scenario.nominal_poses)
     poses[1] = poses[1] @ pose.at((0.0, mm * 1e-3, 0.0))
     seen = Observation(scenario.assembly, scenario.start, poses, np.tile(np.eye(6) * 1e-6, (n, 1, 1)), np.ones(n, bool))
     write_form(observation_form(seen, "stick_in_tower"), folder / "seen.json")

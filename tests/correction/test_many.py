@@ -22,9 +22,9 @@ def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) ->
     rng = np.random.default_rng(0)
     out = []
     for i in range(count):
-        n = len(scene.goals)
+        n = len(scene.nominal_poses)
         L = crooked(n, rng, mm, deg) if i % 2 else scales(n, mm, deg)
-        seen = scenes.seen(scene, twisted(scene.goals, L, rng))
+        seen = scenes.seen(scene, twisted(scene.nominal_poses, L, rng))
         out.append(replace(seen, covariance=L @ np.swapaxes(L, 1, 2)))
     return out
 
@@ -76,7 +76,7 @@ def test_no_operations_and_no_contacts() -> None:
         assert made.ok
         assert_allclose(made.poses, one.poses, rtol=0, atol=0)
     still = scenes.Scene(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4)))
-    nothing = scenes.seen(still, still.goals)
+    nothing = scenes.seen(still, still.nominal_poses)
     assert [made.status for made in correct_many([nothing, nothing], contact)] == ["converged", "converged"]
 
 

@@ -119,12 +119,12 @@ class Unspeakable(Exception):
     ],
 )
 def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
-    seen = scenes.seen(TOWER, TOWER.goals)
+    seen = scenes.seen(TOWER, TOWER.nominal_poses)
     rng = np.random.default_rng(0)
     with pytest.raises(InputError) as by_noise:
         observe(scenes.shown(TOWER), make_noise(_raising(error), NOISE_LEVEL), rng)
     with pytest.raises(InputError) as by_relations:
-        replace_contacts(seen, _raising(error), TOWER.goals, rng)
+        replace_contacts(seen, _raising(error), TOWER.nominal_poses, rng)
     for raised in (by_noise, by_relations):
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)

@@ -64,7 +64,7 @@ def test_deviations_are_read_where_they_are_stated(tmp_path: Path) -> None:
 
 def test_a_table_comes_back_as_it_was_written(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    goals = SCENARIO.goals @ pose.exp(0.1 * rng.standard_normal((3, 6)))
+    goals = SCENARIO.nominal_poses @ pose.exp(0.1 * rng.standard_normal((3, 6)))
     path = tmp_path / "back.csv"
     path.write_text(table(SCENARIO.assembly, goals), encoding="utf-8")
     assert read_table(path, SCENARIO, (1.0, 1.0))[0].poses == pytest.approx(goals, abs=1e-15)

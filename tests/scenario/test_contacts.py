@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError, Observation, Scenario, correct, load_scenario
 from apo_bench.assembly import Contact, Gap, PartFace
-from apo_bench.perception.observation.wrong_contacts import Shifted, false, missed
+from apo_bench.perception.observation.wrong_contacts import FaceOffset, add_contact, omit_contact
 from apo_bench.resources import folder
 
 SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text(encoding="utf-8")
@@ -33,7 +33,7 @@ def load(tmp_path: Path, *changes: tuple[str, str]) -> Scenario:
 def seen(scenario: Scenario, goals: np.ndarray | None = None) -> Observation:
     n = len(scenario.assembly)
     covariance = np.tile(np.diag(np.repeat([1e-3, np.radians(1.0)], 3) ** 2), (n, 1, 1))
-    goals = scenario.goals if goals is None else goals
+    goals = scenario.nominal_poses if goals is None else goals
     play_m = 1e-3 * scenario.clearance_mm
     return Observation(scenario.assembly, scenario.start, goals, covariance, np.ones(n, dtype=np.bool_), 1e-4, play_m)
 
@@ -125,14 +125,14 @@ def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> Non
     scenario = load(tmp_path, (PAIR, WALLS))
     assembly = scenario.assembly
     rng = np.random.default_rng(0)
-    for wrong in (missed, false):
-        assert wrong(assembly, scenario.start, scenario.goals, rng).gaps == assembly.gaps
+    for wrong in (omit_contact, add_contact):
+        assert wrong(assembly, scenario.start, scenario.nominal_poses, rng).gaps == assembly.gaps
     assert assembly.first(2).gaps == assembly.gaps
     alone = replace(
         assembly,
         operations=tuple(replace(o, contacts=tuple(c for c in o.contacts if c == SPY)) for o in assembly.operations),
     )
-    shifted = Shifted(1e-3)(alone, scenario.start, scenario.goals, rng)
+    shifted = FaceOffset(1e-3)(alone, scenario.start, scenario.nominal_poses, rng)
     contact = shifted.relations()[0].contact
     assert contact.environment.face == "spy_shifted"
     assert shifted.interval(contact, 0.25e-3) == (-0.25e-3, 0.25e-3)
@@ -150,7 +150,7 @@ def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> Non
     )
     scenario = load(tmp_path, *both, *second)
     assert len(scenario.assembly.gaps) == 4
-    goals = np.array(scenario.goals)
+    goals = np.array(scenario.nominal_poses)
     goals[2, 1, 3] += 1e-3
     made = correct(seen(scenario, goals), "contact")
     assert made.ok, made.sentence

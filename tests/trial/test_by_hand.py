@@ -34,9 +34,13 @@ def test_the_verbs_by_hand_give_the_row_of_the_trial(tower: apo_bench.Scene) -> 
 def test_what_was_observed_is_replayed_as_it_is_unless_an_operation_was_not_seen(tower: apo_bench.Scene) -> None:
     scenario = tower.scenario
     seen = apo_bench.Observation(
-        scenario.assembly, scenario.start, scenario.goals, np.tile(1e-6 * np.eye(6), (3, 1, 1)), np.ones(3, dtype=bool)
+        scenario.assembly,
+        scenario.start,
+        scenario.nominal_poses,
+        np.tile(1e-6 * np.eye(6), (3, 1, 1)),
+        np.ones(3, dtype=bool),
     )
-    np.testing.assert_array_equal(seen.plan().target_poses, scenario.goals)
+    np.testing.assert_array_equal(seen.plan().target_poses, scenario.nominal_poses)
     missed = apo_bench.Observation(
         seen.assembly, seen.start, seen.poses, seen.covariance, np.array([True, False, True])
     )

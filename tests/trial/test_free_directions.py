@@ -15,14 +15,18 @@ from tests import scenes
 
 
 def is_uncorrected(scene: scenes.Scene) -> Observation:
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     return Observation(
-        scene.assembly, scene.start, scene.goals, np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)), np.ones(n, bool)
+        scene.assembly,
+        scene.start,
+        scene.nominal_poses,
+        np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)),
+        np.ones(n, bool),
     )
 
 
 def space_of(scene: scenes.Scene) -> FreeSpace:
-    found = free_space(is_uncorrected(scene), scene.goals)
+    found = free_space(is_uncorrected(scene), scene.nominal_poses)
     assert found is not None
     return found
 
@@ -63,7 +67,7 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     space = space_of(scene)
-    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.goals, atol=1e-15)
+    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.nominal_poses, atol=1e-15)
     for _ in range(3):
         s = 3.0 * rng.normal(size=len(space))
         goals = space.place(s)
@@ -75,7 +79,7 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
 def test_contacts_that_are_open_may_stay_open() -> None:
     """Only what holds is held: the castle that stands 1 mm aside is no reason to move it."""
     scene = scenes.stick_in_tower()
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[2] = goals[2] @ scenes.mm(0, 1, 0)
     space = free_space(is_uncorrected(scene), goals)
     assert space is not None
@@ -93,7 +97,7 @@ def test_the_nearest_place_is_found_by_linearising() -> None:
     axis = np.eye(len(space))[1]
 
     def excess(goals: Array) -> Array:
-        return np.array([1e3 * (space.goals - goals)[:, 0, 3].sum() + 2.0])
+        return np.array([1e3 * (space.poses - goals)[:, 0, 3].sum() + 2.0])
 
     found = nearest_fitting(space, lambda goals: True, excess)
     assert found is not None
@@ -106,10 +110,10 @@ def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_
     space = space_of(scenes.stick_in_tower())
 
     def flat(goals: Array) -> Array:
-        far = 1e3 * np.abs(goals - space.goals)[:, :3, 3].max()
+        far = 1e3 * np.abs(goals - space.poses)[:, :3, 3].max()
         return np.array([1.0 if far < 1.0 else -1.0])
 
     found = nearest_fitting(space, lambda goals: True, flat)
     assert found is not None
-    assert 1.0 <= 1e3 * np.abs(found - space.goals)[:, :3, 3].max() < 1.5
+    assert 1.0 <= 1e3 * np.abs(found - space.poses)[:, :3, 3].max() < 1.5
     assert nearest_fitting(space, lambda goals: False, flat) is None

@@ -236,7 +236,7 @@ def test_your_own_code_counts_where_it_makes_noise(tmp_path: Path, monkeypatch: 
     one, two = (own_content("noise", f"own_noise_{k}:blur") for k in (1, 2))
     assert list(one) == ["noise own_noise_1:blur"]
     assert list(one.values()) != list(two.values())
-    assert own_content("contact_source", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
+    assert own_content("contact_source", "face-offset:3mm", "given") == own_content("noise", "empirical:x.csv") == {}
 
 
 def test_a_module_counts_with_what_it_imports_from_the_same_place(

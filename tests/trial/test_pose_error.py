@@ -29,10 +29,10 @@ def reached(scene: scenes.Scene, goals: Array) -> ReachedState:
 
 def errors(scene: scenes.Scene, wrong: Mapping[int, Array]) -> tuple[float | None, float | None]:
     """The errors if operations (from 1) end displaced, in the frames of their parts."""
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     for k, T in wrong.items():
         goals[k - 1] = goals[k - 1] @ T
-    return pose_errors(scene.assembly, scene.start, scene.goals, reached(scene, goals))
+    return pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
 
 
 @pytest.mark.parametrize("build", [scenes.bridge, scenes.pockets])
@@ -59,8 +59,8 @@ def test_pure_errors(wrong: Mapping[int, Array], expected: tuple[float, float]) 
 @pytest.mark.parametrize("build", [scenes.bridge, scenes.pockets])
 def test_planned_goals_and_poses_that_reach_them_have_the_same_errors(build) -> None:
     scene = build()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(6), 2.0, 1.0)
-    given = scene.assembly, scene.start, scene.goals
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(6), 2.0, 1.0)
+    given = scene.assembly, scene.start, scene.nominal_poses
     assert goal_errors(*given, goals) == pose_errors(*given, reached(scene, goals))
 
 
@@ -69,7 +69,7 @@ def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:
     scene = scenes.stick_on_castles()
     error = scenes.mm(0, 0.3, 0)
     fixed, free = errors(scene, {2: error})
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[1] = goals[1] @ error
     mended = solve_newton(build_contact_equations(scene.assembly, scene.start, goals), goals, range(3)).poses
     taken_back = pose.log(pose.inverse(goals) @ mended) * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
@@ -84,19 +84,21 @@ def test_the_two_parts_add_up_and_no_frame_matters(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene = scenes.stick_in_tower()
     xi = rng.standard_normal((3, 6)) * np.repeat([2e-3, 0.02], 3)
-    goals = scene.goals @ pose.exp(xi)
-    fixed, free = pose_errors(scene.assembly, scene.start, scene.goals, reached(scene, goals))
+    goals = scene.nominal_poses @ pose.exp(xi)
+    fixed, free = pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
     assert fixed is not None
     assert free is not None
     scaled = xi * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed**2 + free**2 == pytest.approx((scaled**2).sum() / 3)
     moved = scenes.turned(scene, pose.exp(rng.standard_normal(6)))
-    there = reached(moved, moved.goals @ pose.exp(xi))
-    assert pose_errors(moved.assembly, moved.start, moved.goals, there) == pytest.approx((fixed, free), abs=1e-6)
+    there = reached(moved, moved.nominal_poses @ pose.exp(xi))
+    assert pose_errors(moved.assembly, moved.start, moved.nominal_poses, there) == pytest.approx(
+        (fixed, free), abs=1e-6
+    )
 
 
 def test_an_operation_that_was_not_finished_has_no_error() -> None:
     scene = scenes.stick_in_tower()
-    whole = reached(scene, scene.goals)
+    whole = reached(scene, scene.nominal_poses)
     partly = ReachedState((whole.after[0], None, None), None)
-    assert pose_errors(scene.assembly, scene.start, scene.goals, partly) == (None, None)
+    assert pose_errors(scene.assembly, scene.start, scene.nominal_poses, partly) == (None, None)

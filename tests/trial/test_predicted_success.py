@@ -195,7 +195,7 @@ def test_below_abstain_the_arm_never_moves(
     least = min(1.0, carried_out["predicted_success"] + 1e-6)
     monkeypatch.setattr(run, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     kept = row(scene, simulated, min_predicted_success=least)
-    assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
+    assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "predicted-success", "abstained")
     assert (kept["sim_time_s"], kept["reached"]) == (None, None)
     assert kept["predicted_success"] == carried_out["predicted_success"]
 
@@ -213,7 +213,7 @@ def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, sim
         "success": False,
         "as_demonstrated": False,
         "loose_success": False,
-        "failure_stage": "promise",
+        "failure_stage": "predicted-success",
         "failure_code": "abstained",
         "predicted_success": 0.005,
     }

@@ -62,7 +62,7 @@ def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) ->
         assert list(row) == keys
         assert json.loads(json.dumps(row, allow_nan=False)) == row
         assert (row["schema"], row["env_id"]) == (RECORD_SCHEMA, ENV_ID)
-        assert row["thresholds"]["displaced_mm"] == 1.0
+        assert row["thresholds"]["placed_part_shift_mm"] == 1.0
         assert row["demonstration"] == "ok"
 
 
@@ -138,13 +138,13 @@ def test_wrong_relations_are_told_and_noted(
     scene: Scene, shown: SimulatedDemonstration, rows: dict[str, dict[str, Any]]
 ) -> None:
     """Correctors meet them, nothing else does; robot and judge keep the right ones."""
-    kinds = ("false-negative", "false-positive", "shifted:3")
+    kinds = ("false-negative", "false-positive", "face-offset:3mm")
     told = {k: run_trial(replace(SPEC, method="paper", contact_source=k), scene, simulated=shown) for k in kinds}
     assert [told[k]["contact_source"] for k in kinds] == list(kinds)
     assert [told[k]["wrong_contact"] is None for k in kinds] == [True, False, False]
     assert rows["paper"]["wrong_contact"] is None
-    assert told["shifted:3"]["success"] is False
-    raw = [rows["uncorrected"], run_trial(replace(SPEC, contact_source="shifted:3"), scene, simulated=shown)]
+    assert told["face-offset:3mm"]["success"] is False
+    raw = [rows["uncorrected"], run_trial(replace(SPEC, contact_source="face-offset:3mm"), scene, simulated=shown)]
     apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
     assert apart == {"contact_source", "config_hash"}
 
@@ -172,7 +172,7 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     arm.write_text("<mujoco/>")
     part = tmp_path / "castle.xml"
     part.write_bytes(scenario.part_files["castle1"].read_bytes() + b"\n")
-    stricter = replace(scenario, thresholds=replace(scenario.thresholds, displaced_mm=0.5))
+    stricter = replace(scenario, thresholds=replace(scenario.thresholds, placed_part_shift_mm=0.5))
     wider = replace(scenario, clearance_mm=0.5)
     hashes = {
         first,
@@ -218,7 +218,7 @@ def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedD
 
 def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: SimulatedDemonstration) -> None:
     """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
-    planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.poses)
+    planned = apply_method(lambda seen: scene.scenario.nominal_poses, observed(scene, shown), shown.layout.poses)
     assert planned.plan is not None
     assert planned.gap_after_m < 1e-9
     verdict = stages.replay_and_judge(planned.plan, scene, shown.layout.poses).verdict
@@ -271,8 +271,8 @@ def test_a_noise_level_is_one_number_or_two_and_one_of_a_ray() -> None:
 
 
 @pytest.mark.parametrize("contact_source", ["detected-jointly:3", "false-negative:"])
-def test_only_shifted_contacts_have_a_size(contact_source: str) -> None:
-    with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
+def test_only_a_face_offset_has_a_size(contact_source: str) -> None:
+    with pytest.raises(InputError, match="only face-offset takes a size, as in face-offset:3mm"):
         TrialConfig("stick_in_tower", contact_source=contact_source)
 
 

@@ -42,9 +42,11 @@ def test_parts_that_follow_a_human_error() -> None:
 
 def test_numbers_are_those_of_the_scenario() -> None:
     scenario = load_scenario("stick_in_tower")
-    text = task_sheet(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, displaced_mm=7.0)))
+    text = task_sheet(
+        replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, placed_part_shift_mm=7.0))
+    )
     assert "at 0.4 mm clearance per side: fit margin mm 0.1, " in text
-    assert ", displaced mm 7, " in text
+    assert ", placed part shift mm 7, " in text
     assert "x 120 ± 40 mm, y 0 ± 60 mm, turned by -28 to 28 degrees" in text
     assert "- Operation 2: castle2 by -4 to 4 mm along its x axis." in text
 

@@ -24,7 +24,7 @@ def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: A
 
 
 def test_calibration_counts_coverage_alarms_and_culprits() -> None:
-    wrong = {"contact_source": "shifted:3", "wrong_contact": "R2"}
+    wrong = {"contact_source": "face-offset:3mm", "wrong_contact": "R2"}
     rows = [
         *(
             row("oracle", seed=0),
@@ -59,7 +59,7 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert (missed["failed_tests"], missed["culprits"]) == ((1, 1), (0, 0))
     lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
     assert "| uncorrected | 0 | – | – | – | – | – | – |" in lines
-    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
+    assert "| face-offset:3mm | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
 
 
 def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:

@@ -84,9 +84,11 @@ def test_the_grid_is_every_combination_once() -> None:
 
 def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None:
     spec = replace(
-        SPEC, noise=("isotropic", "per-part"), contact_source=("given", "false-negative", "shifted:3.0", "shifted:3")
+        SPEC,
+        noise=("isotropic", "per-part"),
+        contact_source=("given", "false-negative", "face-offset:3.0mm", "face-offset:3mm"),
     )
-    assert spec.contact_source == ("given", "false-negative", "shifted:3")
+    assert spec.contact_source == ("given", "false-negative", "face-offset:3mm")
     loaded = load_all([spec])
     trials = [t for unit in units([spec], loaded) for t in unit]
     keys = {make_trial_key(t, "stick_in_tower") for t in trials}
@@ -209,7 +211,10 @@ def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: s
     [
         ({"scenario": ("stick_in_towr",)}, "did you mean 'stick_in_tower'"),
         ({"noise": ("isotropc",)}, "did you mean 'isotropic'"),
-        ({"contact_source": ("shifted:0",)}, "a size above 0 and up to 50 mm is allowed: shifted:3"),
+        (
+            {"contact_source": ("face-offset:0mm",)},
+            "the offset must be above 0 and at most 50 mm, with its unit, as in face-offset:3mm",
+        ),
         ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
         ({"method": ("json:nothing",)}, "unknown corrector in module json 'nothing'"),
     ],

@@ -25,7 +25,7 @@ SIGMA = np.repeat([1e-3, np.radians(1.0)], 3)
 
 def noisy(name: str, seed: int = 0) -> Observation:
     built = scenes.ALL[name]()
-    return scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(seed), 1.0, 1.0))
+    return scenes.seen(built, scenes.noisy(built.nominal_poses, np.random.default_rng(seed), 1.0, 1.0))
 
 
 def length(seen: Observation, goals: Array) -> float:
@@ -39,10 +39,10 @@ def length(seen: Observation, goals: Array) -> float:
 def test_what_is_consistent_stays_as_it_is(method: str, within: float, name: str) -> None:
     """But for `penalty`: Adam follows gradients that are rounding, and ended up to 4.5e-4 away under other kernels."""
     built = scenes.ALL[name]()
-    made = correct(scenes.seen(built, built.goals), method)
+    made = correct(scenes.seen(built, built.nominal_poses), method)
     assert made.ok
     assert made.gap_after_m < 1e-6
-    assert np.abs(made.poses - built.goals).max() < within
+    assert np.abs(made.poses - built.nominal_poses).max() < within
 
 
 @pytest.mark.parametrize("method", [*STATIC, settle])
@@ -57,7 +57,7 @@ def test_an_operation_that_was_not_seen_is_refused(method: Any) -> None:
 def test_what_was_seen_well_moves_less(method: str) -> None:
     """C is 2 mm off B, along x: whichever was seen a hundred times better stays, the other one comes."""
     built = scenes.bridge()
-    goals = built.goals.copy()
+    goals = built.nominal_poses.copy()
     goals[1:, 0, 3] += 2e-3
     seen = scenes.seen(built, goals)
     for sure, other in ((0, 1), (1, 0)):
@@ -98,7 +98,7 @@ def test_snap_takes_the_most_likely_of_all_poses_that_fit() -> None:
 def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -> None:
     """The truth has no gap, so at the optimum (e / contact_m)^2 + |z|^2 is at most the squared length of the noise."""
     seen = noisy(name)
-    truth = scenes.ALL[name]().goals
+    truth = scenes.ALL[name]().nominal_poses
     made = correct(seen, partial(least_squares, contact_m=contact_m))
     assert made.gap_after_m**2 / contact_m**2 + length(seen, made.poses) ** 2 <= length(seen, truth) ** 2 * (1 + 1e-9)
     assert made.gap_after_m < 0.5 * contact_m
@@ -119,7 +119,7 @@ def test_the_gradient_of_the_penalty_is_that_of_differences(name: str) -> None:
 def test_depth_is_the_shortest_way_out() -> None:
     """Blocks that stand straight: the intrusion of two solids, as separating axes measure it."""
     built = scenes.bridge()
-    goals = built.goals.copy()
+    goals = built.nominal_poses.copy()
     goals[1, :3, 3] += (-2e-3, 1e-3, -0.5e-3)
     system = build_contact_equations(built.assembly, built.start, goals)
     found = intruding(meeting(built.assembly, system), goals)
@@ -144,5 +144,5 @@ def test_the_descent_goes_down_and_closes_most_of_the_gap(name: str) -> None:
 def test_a_stick_sinks_by_the_play_that_is_stated() -> None:
     play_mm = 1.0
     built = scenes.stick_on_castles()
-    made = correct(replace(scenes.seen(built, built.goals), play_m=play_mm * 1e-3), settle)
-    assert made.poses[2, 2, 3] == pytest.approx(built.goals[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)
+    made = correct(replace(scenes.seen(built, built.nominal_poses), play_m=play_mm * 1e-3), settle)
+    assert made.poses[2, 2, 3] == pytest.approx(built.nominal_poses[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)

@@ -47,7 +47,7 @@ def together(deg: float) -> Error:
 
 def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Collection[int]) -> float:
     """What remains, [mm], when operations (from 1) are wrong and others (from 1) may change."""
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
@@ -97,7 +97,7 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     for level in (0.5, 1.0, 2.0):
-        seen = scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level))
+        seen = scenes.seen(scene, scenes.noisy(scene.nominal_poses, rng, level, level))
         found = paper(seen)
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
@@ -109,7 +109,7 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
 
 def test_the_world_frame_does_not_matter() -> None:
     scene = scenes.stick_in_tower()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(2), 2.0, 1.0)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(2), 2.0, 1.0)
     W = pose.at((0.11, -0.02, 0.0), (0.0, 0.0, 27.0))
     moved = scenes.turned(scene, W)
     there = paper(scenes.seen(moved, W @ goals))
@@ -132,7 +132,7 @@ def drift(scene: scenes.Scene, seen: Array) -> float:
 def test_free_directions_stay_where_they_were_seen(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(7)
-    drifts = [drift(scene, scenes.noisy(scene.goals, rng, 2.0, 1.0)) for _ in range(10)]
+    drifts = [drift(scene, scenes.noisy(scene.nominal_poses, rng, 2.0, 1.0)) for _ in range(10)]
     assert max(drifts) < 0.2
 
 
@@ -148,7 +148,7 @@ def contradiction() -> Observation:
     )
     operation = scenes.Operation("block", scenes.touch("block", "table", "nz-top", "pz-roof"))
     scene = scenes.scene([low, scenes.block()], [operation], [scenes.mm(0, 0, 27)])
-    return scenes.seen(scene, scene.goals)
+    return scenes.seen(scene, scene.nominal_poses)
 
 
 def test_contacts_that_contradict_each_other_are_inconsistent() -> None:
@@ -161,7 +161,7 @@ def test_contacts_that_contradict_each_other_are_inconsistent() -> None:
 
 def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
     scene = scenes.stick_on_castles()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(0), 1.0, 1.0)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(0), 1.0, 1.0)
     found = paper(replace(scenes.seen(scene, goals), observed=np.array([True, False, True])))
     assert (found.status, found.sentence, found.freed) == ("not_seen", "operation 2 was not seen", ())
     assert_array_equal(found.poses, goals)
@@ -170,7 +170,7 @@ def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
 
 def test_numbers_that_overflow_are_not_finite() -> None:
     scene = scenes.stick_on_castles()
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[2, :3, 3] = 1.7e308
     with np.errstate(all="ignore"):
         found = paper(scenes.seen(scene, goals))
@@ -205,7 +205,7 @@ def test_a_careless_human_frees_the_candidates_of_the_paper(
 
 
 def tilted(scene: scenes.Scene, k: int, mm: float, deg: float) -> Array:
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[k] = goals[k] @ scenes.mm(0.4, -0.3, mm, (deg, -deg, 3.0))
     return goals
 
@@ -227,7 +227,7 @@ def test_a_goal_that_is_no_candidate_is_settled_for_what_it_makes() -> None:
 
 def noisy_tower() -> Observation:
     scene = scenes.stick_in_tower()
-    return scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0))
+    return scenes.seen(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(4), 1.0, 1.0))
 
 
 def test_correct_by_name_by_path_and_by_object() -> None:

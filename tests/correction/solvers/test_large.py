@@ -63,8 +63,8 @@ SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {
 def drawn(name: str, seed: int = 0) -> tuple[CompactEquations, Array, Array]:
     scene = SMALL[name][0]()
     rng = np.random.default_rng(seed)
-    L = crooked(len(scene.goals), rng)
-    seen = twisted(scene.goals, L, rng)
+    L = crooked(len(scene.nominal_poses), rng)
+    seen = twisted(scene.nominal_poses, L, rng)
     return system_of(scene, seen), seen, L
 
 
@@ -123,19 +123,19 @@ def test_a_thousand_blocks_on_one_plate() -> None:
     n = 1000
     scene = hub(n)
     L = scales(n, 0.5, 0.02)
-    seen = twisted(scene.goals, L, np.random.default_rng(0))
+    seen = twisted(scene.nominal_poses, L, np.random.default_rng(0))
     found = find_nearest_poses(system_of(scene, seen), seen, L)
     assert found.at_rest
     assert np.abs(found.e).max() <= 1e-9
     assert posterior.compute_jacobian_rank(found.Jt) == 3 * n
-    truth = correction(seen, scene.goals, L)
+    truth = correction(seen, scene.nominal_poses, L)
     assert found.z @ found.z <= truth @ truth
 
 
 def test_the_corrector_takes_many_operations_whole() -> None:
     """What would be a dense matrix is not stated; everything else is."""
     scene = fence(400)
-    goals = twisted(scene.goals, scales(400, 1.0, 1.0), np.random.default_rng(1))
+    goals = twisted(scene.nominal_poses, scales(400, 1.0, 1.0), np.random.default_rng(1))
     made = correct(scenes.seen(scene, goals), "contact")
     assert made.ok, made.sentence
     assert made.rank == 3 + 399 * 5
@@ -148,10 +148,10 @@ def test_the_corrector_takes_many_operations_whole() -> None:
 def test_rounding_does_not_stop_the_banded_solver() -> None:
     """With nothing on the diagonal, redundant equations leave a matrix that is not positive definite."""
     scene = of_problem("chain10")
-    system = system_of(scene, scene.goals)
+    system = system_of(scene, scene.nominal_poses)
     where = sparse.incidence(system)
-    _, every = system.blocks(scene.goals, np.tile(np.eye(6), (len(scene.goals), 1, 1)))
+    _, every = system.blocks(scene.nominal_poses, np.tile(np.eye(6), (len(scene.nominal_poses), 1, 1)))
     found = every[where.contact, where.letter]
-    right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.goals)))
+    right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.nominal_poses)))
     z = sparse.sparse_solver(where)(np.zeros(len(right)), found, right)
     assert_allclose(where.times(found, z), right, rtol=0, atol=1e-6 * np.abs(right).max())

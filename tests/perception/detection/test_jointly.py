@@ -35,7 +35,7 @@ def with_contacts(seen: Observation, *each: str) -> Assembly:
 def block_at(x: float, y: float, z: float, noise_level: float = 1.0) -> Observation:
     """One block seen here, in mm."""
     scene = scenes.scene([scenes.table(), scenes.block("A")], [Operation("A")], [scenes.mm(x, y, z)])
-    return stated(scenes.seen(scene, scene.goals), noise_level)
+    return stated(scenes.seen(scene, scene.nominal_poses), noise_level)
 
 
 def beside(apart_mm: float, noise_level: float) -> Observation:
@@ -166,6 +166,6 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None
 def test_round_faces_are_recognised_with_flat_ones() -> None:
     """A peg in the bore of a plate, both on the table."""
     scene = rounds.peg_in_plate()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(1), 0.5, 0.5)
     recognised = detect_contacts_jointly(stated(scenes.seen(scene, goals), 0.5))
     assert contacts(recognised.assembly) == contacts(scene.assembly)

@@ -25,7 +25,7 @@ def errors(noise_level: NoiseLevel, draws: int) -> Array:
     rng = np.random.default_rng(11)
     demonstration = scenes.shown(TOWER)
     seen = [IsotropicNoise(noise_level)(demonstration.assembly, demonstration, rng).poses for _ in range(draws)]
-    return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
+    return pose.log(pose.inverse(TOWER.nominal_poses) @ np.array(seen)).reshape(-1, 6)
 
 
 def test_errors_are_gaussian() -> None:
@@ -76,7 +76,7 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     assert make_noise(IsotropicNoise, noise_level) == IsotropicNoise(noise_level)
     assert make_noise(IsotropicNoise(NoiseLevel(9.0, 9.0)), noise_level) == IsotropicNoise(NoiseLevel(9.0, 9.0))
     assert make_noise(plain, noise_level) is plain
-    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.goals)
+    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.nominal_poses)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_what_make_noise_refuses(given: object, noise_level: NoiseLevel, message
     assert message in str(refused.value)
 
 
-GOOD = scenes.seen(TOWER, TOWER.goals)
+GOOD = scenes.seen(TOWER, TOWER.nominal_poses)
 SKEWED = GOOD.covariance.copy()
 SKEWED[1, 0, 1] = 1e-7
 
@@ -102,10 +102,10 @@ SKEWED[1, 0, 1] = 1e-7
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.Observation"),
-        (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
+        (TOWER.nominal_poses, "returned ndarray; return an apo_bench.assembly.Observation"),
+        (scenes.seen(scenes.stick_in_tower(), TOWER.nominal_poses), "changed the assembly"),
         (replace(GOOD, start={}), "changed which parts have a start pose"),
-        (replace(GOOD, poses=1.1 * TOWER.goals), "pose of operation 1 that is not rigid"),
+        (replace(GOOD, poses=1.1 * TOWER.nominal_poses), "pose of operation 1 that is not rigid"),
         (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
     ],
 )
