@@ -25,9 +25,9 @@ import math
 import numpy as np
 from pathlib import Path
 from apo_bench.errors import InputError
-from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 
-mine = Isotropic((2.0, 2.0))
+mine = IsotropicNoise((2.0, 2.0))
 
 def name(assembly, shown, rng):
     return no_such_name

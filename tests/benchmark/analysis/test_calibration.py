@@ -44,7 +44,7 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
         ),
         corrected(3, False, ("R3",), **wrong | {"contact_source": "false-negative", "wrong_contact": None}),
     ]
-    raw, right, missed, shifted = tabulate_calibration(rows)
+    raw, right, shifted, missed = tabulate_calibration(rows)
     assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == [
         "uncorrected",
         (0, 0),

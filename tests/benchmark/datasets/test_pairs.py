@@ -161,7 +161,7 @@ def test_no_stream_of_chance_is_one_of_a_trial() -> None:
 def test_neither_simulator_nor_torch_is_loaded() -> None:
     """Part files alone are read by MuJoCo."""
     code = (
-        "import sys; from apo_bench.benchmark.datasets import pairs; pairs('dovetail', n=2)\n"
+        "import sys; from apo_bench.benchmark.datasets import draw_pairs; draw_pairs('dovetail', n=2)\n"
         "print([m for m in ('mink', 'torch', 'apo_bench.simulation', 'apo_bench.trial') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
