@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 SETTINGS: dict[str, str] = {}
 """Settings of trials, arguments of environments and columns of records: neutral name -> name today."""
-VALUES = {"face-offset:3mm": "face-offset:3mm", "face-offset:5mm": "face-offset:5mm", "predicted-success": "predicted-success"}
+VALUES = {"shifted:3": "face-offset:3mm", "shifted:5": "face-offset:5mm", "promise": "predicted-success"}
 """Values of settings, and correctors."""
 EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
@@ -135,8 +135,8 @@ OPTIONS = (
     "method=contact arm=ur5e_primitive",
     "method=oracle+probe robot_error=tool:0.5 ft_sensor=ideal fidelity=near-contact",
     "method=least-squares noise=correlated",
-    "method=contact-robust contact_source=face-offset:3mm",
-    "method=contact-drop contact_source=face-offset:5mm",
+    "method=contact-robust contact_source=shifted:3",
+    "method=contact-drop contact_source=shifted:5",
     "method=contact noise_mm=4 noise_deg=4 min_predicted_success=0.9",
     "method=contact-robust noise=flips:p=0.2/r=0.5 max_reobservations=1",
     "method=paper robot_error=joints:0.05 fidelity=near-contact",
