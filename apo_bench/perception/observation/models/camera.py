@@ -71,7 +71,7 @@ class Camera:
     def twists(self, poses: Array, errors: Array) -> Array:
         """Body twists (n, 6) of errors that are given in the frames of the rays.
 
-        Turn first, then shift in the frame that is seen: xi = (R_seen^t F d, R^t F w), R_seen = R exp(R^t F w). The
+        Turn first, then shift in the frame that is seen: xi = (R_obs^t F d, R^t F w), R_obs = R exp(R^t F w). The
         twist is thus linear in the error, and with covariance S in the frame of the ray its own is exactly that of
         `covariance` for that ray, since a turn leaves its own axis where it is.
 
@@ -82,8 +82,8 @@ class Camera:
         frames = self.frames(poses)
         turn = np.zeros((len(poses), 6))
         turn[:, 3:] = np.einsum("nji,njk,nk->ni", poses[:, :3, :3], frames, errors[:, 3:])
-        R_seen = (poses @ pose.exp(turn))[:, :3, :3]
-        shift = np.einsum("nji,njk,nk->ni", R_seen, frames, errors[:, :3])
+        R_obs = (poses @ pose.exp(turn))[:, :3, :3]
+        shift = np.einsum("nji,njk,nk->ni", R_obs, frames, errors[:, :3])
         return np.concatenate([shift, turn[:, 3:]], axis=1)
 
     def covariance(self, seen: Array, errors: Array) -> Array:

@@ -65,15 +65,16 @@ class FittedNoise:
     camera: Camera = field(default_factory=Camera)
 
     FACTS: ClassVar[Facts] = Facts(
-        title="the tails, outliers and misses that were fitted to a pose estimator",
+        title="tails, outliers and misses fitted to a pose estimator",
         formula=(
-            "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
-            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2), w alike; no |d|, |w| above its limit",
+            "T_obs = T exp(xi), xi = (R_obs^t F d, R^t F w)",
+            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2); w likewise",
+            "no |d|, |w| above its limit",
             "of an outlier: |d| log-uniform from the limit to the farthest, any direction, any turn; times L",
         ),
         frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
         parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
-        states="that of what is no outlier, within the limits, turned into the part that is seen, and its tails",
+        states="the covariance of inliers within the limits, in the frame of the part, and the tails",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
         measured=True,
     )

@@ -36,21 +36,21 @@ class OutlierNoise:
     times: float = OUTLIER_TIMES
 
     FACTS: ClassVar[Facts] = Facts(
-        title="gross outliers that do not say so, and operations that are missed",
-        formula=("T_seen = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: seen = false"),
-        frame="of the part that is seen, the same in every direction",
+        title="gross outliers that are not marked, and missed operations",
+        formula=("T_obs = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: observed = false"),
+        frame="of the observed part, isotropic",
         parameters=(
-            f"p = {OUTLIERS:g}: share of outliers among what is seen",
+            f"p = {OUTLIERS:g}: share of outliers among the observed operations",
             f"q = {MISSES:g}: share of misses",
             f"m = {OUTLIER_TIMES:g}: an outlier errs m times as much",
         ),
         states=(
-            f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
+            f"L^2, the covariance of inliers; that of all errors is 1 + p (m^2 - 1) = "
             f"{1.0 + OUTLIERS * (OUTLIER_TIMES**2 - 1.0):g} times as large"
         ),
         notes=(
-            f"A missed operation has the pose at which its part was seen last, or started, with "
-            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods refuse it",
+            f"A missed operation has the last observed pose of its part, or its start, with "
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods reject it",
             "At level 0 nothing is missed",
         ),
     )
