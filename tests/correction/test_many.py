@@ -22,9 +22,9 @@ def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) ->
     rng = np.random.default_rng(0)
     out = []
     for i in range(count):
-        n = len(scene.goals)
+        n = len(scene.nominal_poses)
         L = crooked(n, rng, mm, deg) if i % 2 else scales(n, mm, deg)
-        seen = scenes.seen(scene, twisted(scene.goals, L, rng))
+        seen = scenes.seen(scene, twisted(scene.nominal_poses, L, rng))
         out.append(replace(seen, covariance=L @ np.swapaxes(L, 1, 2)))
     return out
 

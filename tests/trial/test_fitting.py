@@ -101,7 +101,7 @@ def test_contacts_that_are_off_are_left_alone() -> None:
 def test_what_was_not_corrected_is_not_moved(method: str) -> None:
     seen = seen_at("carried_bridge", 96)
     scene = scene_named("carried_bridge")
-    truth = scene.scenario.goals
+    truth = scene.scenario.nominal_poses
     made = apply_method(method, seen, truth, where=scene)
     assert made.plan is not None
     assert made.fitting is None

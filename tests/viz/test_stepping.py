@@ -27,7 +27,7 @@ from apo_bench.viz.trial_again import repeat_trial
 def with_target_poses(scene: Scene) -> Rollout:
     """What the tower asks for, as if it had been seen 1 cm aside."""
     rollout = scenario_story(scene)
-    true = scene.scenario.goals
+    true = scene.scenario.nominal_poses
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
     return Rollout(scene, rollout.segments, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
@@ -158,7 +158,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
     assert {name: again[name] for name in ("success", "worst_gap_mm")} == {
         name: row[name] for name in ("success", "worst_gap_mm")
     }
-    assert set(rollout.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
+    assert set(rollout.poses) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
     reached = read_part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():

@@ -71,7 +71,15 @@ def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     [
         ({"noise": "my noise.toml"}, ()),
         ({"noise": "flips:p=0.1/r=0.5"}, ()),
-        ({"noise": "empirical:mine.csv", "contact_source": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
+        (
+            {
+                "noise": "empirical:mine.csv",
+                "contact_source": "face-offset:3mm",
+                "method": "contact",
+                "arm": "six_axis",
+            },
+            (),
+        ),
         *((names, tuple(names.values())) for names in NAMES),
     ],
 )

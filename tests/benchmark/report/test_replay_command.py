@@ -72,12 +72,12 @@ def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     assert replay_command(row("uncorrected", 3, **usual)) == replay_command(row("uncorrected", 3)) == said
     other = row(
         "my mod:it's", 9, noise_mm=0.1, noise_deg=0.3, human_error_scale=0.5, noise="a b.toml",
-        contact_source="shifted:3", grasp="weld",
+        contact_source="face-offset:3mm", grasp="weld",
         clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "near-contact", "arm": "mine:arm"}),
     )  # fmt: skip
     assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == shlex.split(
         "apo-bench run 'my dir/tower.toml' --noise-mm 0.1 --noise-deg 0.3 --human-error-scale 0.5 --clearance-mm 0.3 "
-        "--noise 'a b.toml' --grasp weld --arm mine:arm --contact-source shifted:3 --method \"my mod:it's\" "
+        "--noise 'a b.toml' --grasp weld --arm mine:arm --contact-source face-offset:3mm --method \"my mod:it's\" "
         "--timestep-ms 0.5 --fidelity near-contact --seed 9"
     )
     seen = row("contact", 1, noise_mm=0.5, noise_deg=0.0, noise="depth-camera", pose_source="depth-camera")

@@ -122,7 +122,7 @@ def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
     observation = look("vanished_fixture", 5)
     wrong = replace_contacts(
-        observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
+        observation, make_contacts("face-offset:10mm"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
     )
     found = correct(wrong, "contact-robust")
     assert found.ok
@@ -139,7 +139,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     """Without the whole relation the goal would be as far off as it was seen."""
     observation = look("pocket_table", seed)
     truth = shown("pocket_table", seed)[1].poses
-    wrong = replace_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
+    wrong = replace_contacts(observation, make_contacts("face-offset:5mm"), truth, np.random.default_rng(seed))
     found = correct(wrong, "contact-robust")
     assert found.ok
     assert found.left_out == ()

@@ -20,8 +20,8 @@ SEEDS = st.integers(0, 10**6)
 
 
 def both(scene: scenes.Scene) -> tuple[Equations, CompactEquations]:
-    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
-    return system, build_compact_equations(system, len(scene.goals))
+    system = build_contact_equations(scene.assembly, scene.start, scene.nominal_poses)
+    return system, build_compact_equations(system, len(scene.nominal_poses))
 
 
 def dense(system: CompactEquations, T: Array) -> tuple[Array, Array]:
@@ -45,7 +45,7 @@ def check_same(scene: scenes.Scene, moved: Array) -> None:
 @settings(max_examples=30, deadline=None)
 def test_normal_equations_of_random_assemblies(seed: int) -> None:
     scene = random_scene(seed)
-    check_same(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 20.0, 20.0))
+    check_same(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), 20.0, 20.0))
 
 
 @given(SEEDS, st.integers(3, 9))

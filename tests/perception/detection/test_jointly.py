@@ -35,7 +35,7 @@ def with_contacts(seen: Observation, *each: str) -> Assembly:
 def block_at(x: float, y: float, z: float, noise_level: float = 1.0) -> Observation:
     """One block seen here, in mm."""
     scene = scenes.scene([scenes.table(), scenes.block("A")], [Operation("A")], [scenes.mm(x, y, z)])
-    return stated(scenes.seen(scene, scene.goals), noise_level)
+    return stated(scenes.seen(scene, scene.nominal_poses), noise_level)
 
 
 def beside(apart_mm: float, noise_level: float) -> Observation:
