@@ -34,7 +34,7 @@ from apo_bench.geometry.symmetry import (
     turn_about,
     turn_alike,
 )
-from apo_bench.geometry.twist import ADJOINTS, GENERATORS, SERIES, exp_and_jacobian, right_jacobian
+from apo_bench.geometry.twist import ADJOINTS, GENERATORS, exp_and_jacobian, right_jacobian
 
 __all__ = (
     "ADJOINTS",
@@ -43,7 +43,6 @@ __all__ = (
     "GENERATORS",
     "PAD_M",
     "SAGITTA_M",
-    "SERIES",
     "TOUCH_M",
     "WHOLE_TURN",
     "Array",

@@ -12,8 +12,8 @@ import pytest
 from benchmarks import switches
 from benchmarks.switches import EXPECTED, Kernels, Switch
 
-OWN = Kernels(("SkylakeX", "SkylakeX"), ("X86_V3", "X86_V4"), ("znver4", "+avx2"))
-BARE = replace(OWN, numpy=(), numba=("generic",))
+OWN = Kernels(("SkylakeX", "SkylakeX"), ("X86_V3", "X86_V4"))
+BARE = replace(OWN, numpy=())
 
 
 def found(
@@ -39,14 +39,13 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
     assert own == "SkylakeX is not run again: it is what OpenBLAS takes on this processor by itself"
     assert half == "Nehalem is not run: OpenBLAS takes Nehalem and SkylakeX for it on this processor"
     assert dead == "Cooperlake is not run: this processor lacks instructions that it needs"
-    assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4", "NUMBA_CPU_NAME": "generic"}
+    assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4"}
 
 
 @pytest.mark.parametrize(
     ("plain", "words"),
     [
         (replace(BARE, numpy=("X86_V3",)), r"is not run: \('X86_V3',\) stay on"),
-        (replace(BARE, numba=OWN.numba), "is not run: .*znver4.* stay on"),
         ("a process under it ended with 1", "is not run: a process under it ended with 1"),
     ],
 )
@@ -56,10 +55,10 @@ def test_features_that_stay_on_are_named(monkeypatch: pytest.MonkeyPatch, plain:
 
 
 def test_where_there_is_nothing_to_switch_nothing_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither OpenBLAS nor Numba nor any feature above the least, as on some machines that are not x86."""
-    none = Kernels((), (), ())
+    """Neither OpenBLAS nor any feature above the least, as on some machines that are not x86."""
+    none = Kernels((), ())
     assert found(monkeypatch, none, {"Haswell": OWN}, none) == [
-        "vector features off is not run again: NumPy and Numba use none on this processor",
+        "vector features off is not run again: NumPy uses none on this processor",
         "Haswell is not run: neither NumPy nor SciPy uses OpenBLAS",
     ]
 

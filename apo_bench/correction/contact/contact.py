@@ -47,9 +47,6 @@ class ContactCorrector:
     """The test fails if the p-value is below: the share of false alarms."""
     elsewhere: bool = True
     """Whether other starts are tried where what was observed leads to no solution, or far."""
-    compiled: bool = True
-    """Whether kernels are used where Numba is installed and can keep what it compiles: the same poses but for
-    rounding."""
 
     def __post_init__(self) -> None:
         require(
@@ -94,14 +91,14 @@ class ContactCorrector:
     @check_arguments
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
-        problem = problem_of((observation,), self.level, self.compiled)
+        problem = problem_of((observation,), self.level)
         solved = solve(problem, problem.without(dropped))[0]
         (before_m,) = problem.seen_gap_m()
         return check_facing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
     def _correct(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
-        problem = problem_of(observations, self.level, self.compiled)
+        problem = problem_of(observations, self.level)
         corrections = []
         for i, (before_m, solved) in enumerate(
             zip(problem.seen_gap_m(), solve(problem, problem.all_contacts), strict=True)

@@ -10,7 +10,6 @@ from apo_bench.correction.solvers.inequalities import (
     nearest_between,
     violations,
 )
-from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
 from apo_bench.correction.solvers.newton_descent import descend_to_nearest
 from apo_bench.correction.solvers.play import fit_covariance, plays
@@ -45,7 +44,6 @@ __all__ = (
     "CompactEquations",
     "Freedom",
     "Inequalities",
-    "Kernels",
     "NearestPoses",
     "ProjectedContacts",
     "Solution",

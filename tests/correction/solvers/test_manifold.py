@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from apo_bench.assembly import contact_equations
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.geometry import Array, pose
@@ -46,7 +46,7 @@ def correction(seen: Array, goals: Array, L: Array) -> Array:
 
 def jacobian(system: CompactEquations, found: NearestPoses) -> Array:
     """The derivative of e by z where the solver ended, (3 c, 6 n)."""
-    return np.asarray(system.gathered(system.blocks(found.poses, found.B)[1]).T)
+    return linearise_by(system, found.poses, found.B)[1].T
 
 
 def drift(J: Array, z: Array, directions: int) -> float:
