@@ -24,13 +24,13 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import Assembly, Demonstration, draw_layout, load_scenario
-from apo_bench.assembly import Plan, placements
+from apo_bench.assembly import Plan, compute_placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
 from apo_bench.judging.contacts import face_overlap
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.pose_error import goal_errors
@@ -66,7 +66,7 @@ def is_right(scenario: Scenario, shown: Demonstration, poses: Array) -> bool:
     assembly = shown.assembly
     if goal_errors(assembly, shown.start, shown.poses, poses)[0] > CLEARANCE_MM:
         return False
-    for operation, placed in zip(assembly.operations, placements(assembly, shown.start, poses), strict=True):
+    for operation, placed in zip(assembly.operations, compute_placements(assembly, shown.start, poses), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))
         if not all(face_overlap(assembly, contact, placed) for contact in flat):
             return False
@@ -88,7 +88,7 @@ def count_draw(seed: int, kind: str, name: str) -> Iterator[str]:
     exact = np.zeros((len(layout.poses), 6, 6))
     shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, exact)
     observation = observe(shown, make_noise("isotropic", NoiseLevel(1.0, 1.0)), np.random.default_rng([seed, 32, 1]))
-    wrong = with_contacts(observation, make_contacts(kind), layout.poses, np.random.default_rng([seed, 32, 2]))
+    wrong = replace_contacts(observation, make_contacts(kind), layout.poses, np.random.default_rng([seed, 32, 2]))
     ceiling = replace(observation, assembly=keep_true_contacts(observation.assembly, wrong.assembly))
     yield "draws"
     for method in METHODS:
@@ -114,18 +114,20 @@ def section(counts: Counts) -> str:
         FIRST,
         "## Wrong contacts",
         "",
-        "Written by `python -m benchmarks.wrong_contacts`; the counts of every scenario are in "
-        "`benchmarks/results/wrong_contacts.csv`. The numbers are right plans, without physics, at 1 mm and 1 degree "
-        f"(1 sigma per axis), over {len(SCENARIOS)} scenarios. *Ceiling*: `contact-robust` with all contacts but the "
-        "wrong one. Where no other contact fixes a direction, the observed pose stays, and its error is larger than "
-        "the play. *Dropped*: draws in which `contact-robust` dropped a contact, rightly or wrongly.",
-        "",
         "| wrong | draws | ceiling | `contact` | `contact-drop` | `contact-robust` | dropped rightly | wrongly |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for kind, title in KINDS.items():
         sums = [sum(counts[kind, name, column] for name in SCENARIOS) for column in COLUMNS]
         lines.append(f"| {title} | {' | '.join(map(str, sums))} |")
+    lines += [
+        "",
+        "Right plans, without physics, at 1 mm and 1 degree (1 sigma per axis), over "
+        f"{len(SCENARIOS)} scenarios. *Ceiling*: `contact-robust` with all contacts but the wrong one. Where no other "
+        "contact fixes a direction, the observed pose stays, and its error exceeds the play. *Dropped*: draws in which "
+        "`contact-robust` dropped a contact, rightly or wrongly. `python -m benchmarks.wrong_contacts` writes the "
+        "table; the counts of every scenario are in `benchmarks/results/wrong_contacts.csv`.",
+    ]
     return "\n".join([*lines, LAST])
 
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.contact_kinds import contact_kind, play_mm
+from apo_bench.assembly.contact_kinds import classify_contact, compute_play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose
+from apo_bench.geometry import Array, Face, RoundFace, compute_overlap, find_direction_across, measure_mate, pose
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
@@ -39,7 +39,9 @@ class _Touch(NamedTuple):
     """How deep the other face may come at each."""
 
 
-def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float) -> float | None:
+def compute_joint_play_mm(
+    assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float
+) -> float | None:
     """How far apart a corner of a flat fit contact, or the end of a shaft on a plane, can be at most, [mm].
 
     All contacts count that the same operation makes between the same two parts: none of them gets deeper than its own
@@ -64,16 +66,16 @@ def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, 
     return _opening(faces, together.index(contact), T.tobytes(), clearance_mm)
 
 
-def deep_limit_mm(
+def compute_deep_limit_mm(
     assembly: Assembly, contact: Contact, clearance_mm: float, margin_mm: float, touching_mm: float
 ) -> float:
     """How deep faces may be in each other: the play of the pair and a margin, or what faces that should touch may."""
     a, b = map(assembly.face_of, contact)
-    play = play_mm(a, b, clearance_mm)
+    play = compute_play_mm(a, b, clearance_mm)
     return touching_mm if play is None else play + margin_mm
 
 
-def apart_limit_mm(
+def compute_apart_limit_mm(
     assembly: Assembly,
     contact: Contact,
     made: int,
@@ -82,16 +84,16 @@ def apart_limit_mm(
     margin_mm: float,
     touching_mm: float,
 ) -> float:
-    """How far apart faces may be: as deep as in `deep_limit_mm`, or the play of all faces together and a margin, if
-    that is more.
+    """How far apart faces may be: as deep as in `compute_deep_limit_mm`, or the play of all faces together and a
+    margin, if that is more.
 
     Args:
-        made: As in `joint_play_mm`, and so is `true`.
+        made: As in `compute_joint_play_mm`, and so is `true`.
         margin_mm: What is allowed beyond the play.
         touching_mm: What faces that should touch may be off.
     """
-    deep = deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
-    play = joint_play_mm(assembly, contact, made, true, clearance_mm)
+    deep = compute_deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
+    play = compute_joint_play_mm(assembly, contact, made, true, clearance_mm)
     return deep if play is None else max(deep, play + margin_mm)
 
 
@@ -101,9 +103,9 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, 
 
     With normals n into the free side and points p a motion (v, w) opens n v + (p x n) w.
     """
-    if not {contact_kind(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
+    if not {classify_contact(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
-    if contact_kind(*faces[which]) == "shaft in hole":
+    if classify_contact(*faces[which]) == "shaft in hole":
         return None
     T = np.frombuffer(at).reshape(4, 4)
     touches = [_touch(*pair, T, clearance_mm) for pair in faces]
@@ -144,17 +146,17 @@ def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _To
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):
-        points = overlap(moved, T, rests, np.eye(4)).corners
+        points = compute_overlap(moved, T, rests, np.eye(4)).corners
         return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
-    between = mate(moved, T, rests, np.eye(4))
+    between = measure_mate(moved, T, rests, np.eye(4))
     if isinstance(rests, Face):
         return _Touch(between.points, np.tile(rests.normal, (2, 1)), fit_mm)
     if isinstance(moved, Face):
         return _Touch(between.points, np.tile(-T[:3, :3] @ moved.normal, (2, 1)), fit_mm)
-    x = across_axis(between.axis)
+    x = find_direction_across(between.axis)
     turns = 2.0 * np.pi * (np.arange(_WALLS) + 0.5) / _WALLS
     ring = np.outer(np.cos(turns), x) + np.outer(np.sin(turns), np.cross(between.axis, x))
-    play = play_mm(moved, rests, clearance_mm) or 0.0
+    play = compute_play_mm(moved, rests, clearance_mm) or 0.0
     ends = between.points
     # Walls at r cos(pi / N) from the axis make a polygon whose corners lie on the circle of radius r.
     return _Touch(np.repeat(ends, _WALLS, axis=0), np.tile(ring, (len(ends), 1)), max(0.0, play) * cos(pi / _WALLS))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.contact_kinds import contact_kind
+from apo_bench.assembly.contact_kinds import classify_contact
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
@@ -18,8 +18,8 @@ from apo_bench.geometry import (
     Array,
     Face,
     RoundFace,
-    across_axis,
-    overlap,
+    compute_overlap,
+    find_direction_across,
     pose,
 )
 
@@ -39,7 +39,7 @@ class TouchedContact(NamedTuple):
     """Where round faces touch so, (k, 3), world, [m]; None of flat ones, which touch where they overlap."""
 
 
-def touched_contacts(
+def find_touched_contacts(
     assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
 ) -> list[TouchedContact]:
     """The contacts between a part that moves and a part that rests, round ones once for each normal."""
@@ -52,20 +52,20 @@ def touched_contacts(
     return touches
 
 
-def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
+def find_touch_points(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
     at each, (k, 3)."""
     points = [np.zeros((0, 3))]
     normals = [np.zeros((0, 3))]
     for (m, e), _, n, at in touched:
         if at is None:
-            at = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+            at = compute_overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
         points.append(at)
         normals.append(np.tile(n, (len(at), 1)))
     return np.concatenate(points), np.concatenate(normals)
 
 
-def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
+def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     """Points that a face reaches to, (k, 3), world, [m]: its corners, or rings at both ends of a round one."""
     face = assembly.face_of(of)
     T = poses[of.part]
@@ -75,9 +75,9 @@ def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     return pose.apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
 
-def mouth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
+def measure_entrance_depth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
     """How far before its place on a way a face comes to where another one begins, [m]."""
-    ahead, before = (outline_points(assembly, of, poses) @ way for of in (moved, rests))
+    ahead, before = (list_outline_points(assembly, of, poses) @ way for of in (moved, rests))
     return float(ahead.max() - before.min())
 
 
@@ -104,7 +104,7 @@ def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses:
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
     """The normals of two round faces, and where each acts: off the wall at both ends of what the faces have in common,
     and, where cones meet or a rim, out along the axis."""
-    kind = contact_kind(still, moved)
+    kind = classify_contact(still, moved)
     out = -1.0 if still.hole else 1.0
     axis = T[:3, :3] @ still.axis
     at = pose.apply(T, still.ends)
@@ -126,7 +126,7 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
     face, T = min((still, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
     if face.extent_rad >= WHOLE_TURN - 1e-9:
         z = T[:3, :3] @ face.axis
-        x = across_axis(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
+        x = find_direction_across(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
         y = np.cross(z, x)
         yield from (x, -x, y, -y)
         return

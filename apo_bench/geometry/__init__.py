@@ -1,40 +1,71 @@
 """Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
 
-from apo_bench.geometry.arrays import Array, Ints, copyable, freeze, frozen, real, remembered
-from apo_bench.geometry.clearance import physical_pieces, recede_pieces
-from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
-from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
-from apo_bench.geometry.exact_turns import depth_inside
-from apo_bench.geometry.flips import Flips, approximate_symmetries
-from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
-from apo_bench.geometry.mating import Mate, angle_between, mate
-from apo_bench.geometry.meshes import union_mesh
-from apo_bench.geometry.pads import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds, holds_whole, is_held
+from apo_bench.geometry.arrays import Array, Ints, copy_frozen, copy_real, freeze, make_copyable, remember
+from apo_bench.geometry.clearance import recede_pieces, shrink_pieces
+from apo_bench.geometry.convex import (
+    collect_corners,
+    enclose_in_ball,
+    find_separating_axes,
+    measure_ball_distance,
+    measure_passage,
+    project_on_axes,
+)
+from apo_bench.geometry.covering import (
+    Overlap,
+    compute_overlap,
+    compute_overlap_area,
+    flatten_face,
+    make_plane_frame,
+    measure_face_area,
+    measure_lateral_gap,
+)
+from apo_bench.geometry.exact_turns import measure_depth_inside
+from apo_bench.geometry.flips import Flips, find_approximate_symmetries
+from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, count_sides, find_distinct_directions, make_cylinder_hull
+from apo_bench.geometry.mating import Mate, measure_angle, measure_mate
+from apo_bench.geometry.meshes import build_union_mesh
+from apo_bench.geometry.pads import (
+    FINGER_ROOM_M,
+    PAD_M,
+    PadPlace,
+    find_holds,
+    holds_whole,
+    is_held,
+    measure_held_span,
+    measure_held_width,
+)
 from apo_bench.geometry.penetration import (
     TOUCH_M,
-    drop,
-    drop_depths,
-    intrusion,
-    intrusion_depths,
-    upright_bounds,
-    ways_out,
+    find_ways_out,
+    measure_drop,
+    measure_drop_depths,
+    measure_intrusion,
+    measure_intrusion_depths,
+    measure_upright_bounds,
 )
-from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straighten
+from apo_bench.geometry.polygon import (
+    find_direction_across,
+    find_plane_across,
+    list_polygons,
+    list_rings,
+    make_flat_area,
+    straighten,
+)
 from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, extent, world_bounds
-from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
+from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, measure_extent, measure_world_bounds
+from apo_bench.geometry.swept import PosedPieces, compute_exit_distance, is_way_free
 from apo_bench.geometry.symmetry import (
-    folds,
-    nearest_alike,
-    nearest_symmetric_pose,
-    quarter_turns,
-    revolution,
-    symmetries,
-    turn_about,
-    turn_alike,
+    count_folds,
+    find_least_turned,
+    find_nearest_alike,
+    find_nearest_symmetric_pose,
+    find_revolution,
+    find_symmetries,
+    list_quarter_turns,
+    make_turn,
 )
-from apo_bench.geometry.twist import ADJOINTS, GENERATORS, exp_and_jacobian, right_jacobian
+from apo_bench.geometry.twist import ADJOINTS, GENERATORS, compute_exp_and_jacobian, compute_right_jacobian
 
 __all__ = (
     "ADJOINTS",
@@ -56,67 +87,67 @@ __all__ = (
     "Overlap",
     "PadPlace",
     "Piece",
-    "Posed",
+    "PosedPieces",
     "RoundFace",
     "Solid",
-    "across_axis",
     "all_boxes",
-    "all_corners",
-    "angle_between",
-    "approximate_symmetries",
-    "ball_around",
-    "balls_apart",
-    "beside",
-    "copyable",
-    "cylinder_hull",
-    "depth_inside",
-    "drop",
-    "drop_depths",
-    "exit_distance",
-    "exp_and_jacobian",
-    "extent",
-    "face_area",
-    "first_of_each",
-    "flat_area",
-    "folds",
+    "build_union_mesh",
+    "collect_corners",
+    "compute_exit_distance",
+    "compute_exp_and_jacobian",
+    "compute_overlap",
+    "compute_overlap_area",
+    "compute_right_jacobian",
+    "copy_frozen",
+    "copy_real",
+    "count_folds",
+    "count_sides",
+    "enclose_in_ball",
+    "find_approximate_symmetries",
+    "find_direction_across",
+    "find_distinct_directions",
+    "find_holds",
+    "find_least_turned",
+    "find_nearest_alike",
+    "find_nearest_symmetric_pose",
+    "find_plane_across",
+    "find_revolution",
+    "find_separating_axes",
+    "find_symmetries",
+    "find_ways_out",
+    "flatten_face",
     "freeze",
-    "frozen",
-    "held_span",
-    "held_width",
-    "holds",
     "holds_whole",
-    "intrusion",
-    "intrusion_depths",
     "is_held",
     "is_rigid",
     "is_way_free",
-    "mate",
-    "nearest_alike",
-    "nearest_symmetric_pose",
-    "overlap",
-    "overlap_area",
-    "own_shape",
-    "passage",
-    "physical_pieces",
-    "plane_across",
-    "plane_frame",
-    "polygons_of",
-    "quarter_turns",
-    "real",
+    "list_polygons",
+    "list_quarter_turns",
+    "list_rings",
+    "make_copyable",
+    "make_cylinder_hull",
+    "make_flat_area",
+    "make_plane_frame",
+    "make_turn",
+    "measure_angle",
+    "measure_ball_distance",
+    "measure_depth_inside",
+    "measure_drop",
+    "measure_drop_depths",
+    "measure_extent",
+    "measure_face_area",
+    "measure_held_span",
+    "measure_held_width",
+    "measure_intrusion",
+    "measure_intrusion_depths",
+    "measure_lateral_gap",
+    "measure_mate",
+    "measure_passage",
+    "measure_upright_bounds",
+    "measure_world_bounds",
+    "project_on_axes",
     "recede_pieces",
-    "remembered",
-    "revolution",
-    "right_jacobian",
-    "rings_of",
-    "separating_axes",
-    "shadow",
-    "sides_of",
+    "remember",
+    "shrink_pieces",
     "straighten",
-    "symmetries",
-    "turn_about",
-    "turn_alike",
-    "union_mesh",
-    "upright_bounds",
-    "ways_out",
-    "world_bounds",
 )

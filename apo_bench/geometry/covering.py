@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, freeze
-from apo_bench.geometry.polygon import polygons_of, rings_of, straighten
+from apo_bench.geometry.polygon import list_polygons, list_rings, straighten
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
@@ -45,7 +45,7 @@ class Overlap:
 NO_OVERLAP = Overlap(np.zeros((0, 3)), 0.0)
 
 
-def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
+def compute_overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     """Project `face` along the normal of `on` onto the plane of `on` and clip it there (Section 2.2, Fc of Fig. 1).
 
     Concave outlines, holes and several pieces are allowed. How far the planes are apart does not matter.
@@ -62,25 +62,25 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
         return NO_OVERLAP
-    flat = np.concatenate([straighten(ring) for piece in pieces for ring in rings_of(piece)])
-    corners = pose.apply(T_on @ plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
+    flat = np.concatenate([straighten(ring) for piece in pieces for ring in list_rings(piece)])
+    corners = pose.apply(T_on @ make_plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
 
 
-def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
-    """The area of `overlap` alone, [m^2]."""
+def compute_overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+    """The area of `compute_overlap` alone, [m^2]."""
     return float(sum(piece.area for piece in _common(face, T_face, on, T_on)[1]))
 
 
-def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+def measure_lateral_gap(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     """How far `face`, projected onto the plane of `on`, lies off it, [m]; 0 if one covers some of the other."""
-    return float(face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face).distance(own_shape(on)))
+    return float(face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face).distance(flatten_face(on)))
 
 
 @lru_cache(maxsize=4096)
-def face_area(face: Face) -> float:
+def measure_face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
-    return float(own_shape(face).area)
+    return float(flatten_face(face).area)
 
 
 def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list[Any]]:
@@ -89,23 +89,23 @@ def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list
     T_on_face = pose.inverse(T_on) @ T_face
     if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return None, []
-    common = face_shape(face, _into_plane(on) @ T_on_face).intersection(own_shape(on))
-    return common, [piece for piece in polygons_of(common) if piece.area > SLIVER_M2]
+    common = face_shape(face, _into_plane(on) @ T_on_face).intersection(flatten_face(on))
+    return common, [piece for piece in list_polygons(common) if piece.area > SLIVER_M2]
 
 
 @lru_cache(maxsize=4096)
-def own_shape(face: Face) -> Any:
+def flatten_face(face: Face) -> Any:
     """The face in its own plane."""
     return face_shape(face, _into_plane(face))
 
 
 @lru_cache(maxsize=4096)
 def _into_plane(face: Face) -> Array:
-    return pose.inverse(plane_frame(face))
+    return pose.inverse(make_plane_frame(face))
 
 
 @lru_cache(maxsize=4096)
-def plane_frame(face: Face) -> Array:
+def make_plane_frame(face: Face) -> Array:
     """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]

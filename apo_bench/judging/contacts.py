@@ -11,11 +11,11 @@ from apo_bench.assembly import (
     Contact,
     ContactKind,
     Poses,
-    apart_limit_mm,
-    contact_kind,
-    deep_limit_mm,
+    classify_contact,
+    compute_apart_limit_mm,
+    compute_deep_limit_mm,
 )
-from apo_bench.geometry import Face, Mate, Overlap, mate, overlap
+from apo_bench.geometry import Face, Mate, Overlap, compute_overlap, measure_mate
 from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]
@@ -101,7 +101,7 @@ class ContactJudge(NamedTuple):
             covering=covering,
             loose=near and covering,
             allowed_mm=allowed,
-            kind=contact_kind(*map(self.assembly.face_of, contact)) or "plane on plane",
+            kind=classify_contact(*map(self.assembly.face_of, contact)) or "plane on plane",
         )
 
     def _nearest_limit(
@@ -109,15 +109,15 @@ class ContactJudge(NamedTuple):
     ) -> tuple[float, float | None]:
         """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
-        deep = deep_limit_mm(self.assembly, contact, *lengths)
+        deep = compute_deep_limit_mm(self.assembly, contact, *lengths)
         if gaps is None:
             return deep, None
-        apart = apart_limit_mm(self.assembly, contact, operation, true, *lengths)
+        apart = compute_apart_limit_mm(self.assembly, contact, operation, true, *lengths)
         return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
-    """`gap` and `overlap`, each with what is wrong at the worst contact, if there is anything."""
+    """`gap` and `compute_overlap`, each with what is wrong at the worst contact, if there is anything."""
     apart = [c for c in contacts if not c.touching]
     if apart:
         worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))
@@ -149,12 +149,12 @@ def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
 def _overlap(m: Face, e: Face, at_m: bytes, at_e: bytes) -> Overlap:
     """Remembered, since all trials of a seed share the true ones: two megabytes at most."""
     T_m, T_e = (np.frombuffer(at).reshape(4, 4) for at in (at_m, at_e))
-    return overlap(m, T_m, e, T_e)
+    return compute_overlap(m, T_m, e, T_e)
 
 
 def _mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
     m, e = contact
-    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+    return measure_mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
 
 
 def _when(verdict: ContactVerdict) -> str:

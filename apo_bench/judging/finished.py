@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, placements
-from apo_bench.geometry import Array, Overlap, nearest_alike
+from apo_bench.assembly import Assembly, Contact, Poses, ReachedState, Relation, compute_placements
+from apo_bench.geometry import Array, Overlap, find_nearest_alike
 from apo_bench.judging.contacts import ContactJudge, Share, face_overlap
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
@@ -14,7 +14,7 @@ from apo_bench.records import Thresholds
 
 
 def judge_finished(
-    assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
+    assembly: Assembly, reached: ReachedState, reference: Array, thresholds: Thresholds, clearance_mm: float
 ) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
@@ -35,7 +35,7 @@ def judge_finished(
         return judgement((), (), (), thresholds, all_made=False)
     judge = ContactJudge(assembly, thresholds, clearance_mm)
     away = fixtures(assembly)
-    true = placements(assembly, final.poses, reference)[-1]
+    true = compute_placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
     return judgement(
         tuple(judge.verdict(contact, k, "end", seen, true, share) for contact, k, share in _standing(assembly, away)),
@@ -86,7 +86,9 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
         Not a number where faces that should touch do not meet in the truth itself, so that it cannot be one.
     """
     contacts = tuple(_standing(assembly, fixtures(assembly)))
-    return np.array([_least_overlap(assembly, final, placements(assembly, final, T)[-1], contacts) for T in references])
+    return np.array(
+        [_least_overlap(assembly, final, compute_placements(assembly, final, T)[-1], contacts) for T in references]
+    )
 
 
 def _least_overlap(
@@ -105,7 +107,7 @@ def _least_overlap(
 def _as_meant(assembly: Assembly, final: Poses, true: Poses) -> Poses:
     """Poses of parts turned by that of their symmetries which is nearest to the truth."""
     return {
-        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
+        part: T if part in assembly.fixed else find_nearest_alike(assembly.solids[part], T, true[part])
         for part, T in final.items()
     }
 

@@ -113,7 +113,7 @@ _TWISTS_AND_ONE = np.ascontiguousarray(np.swapaxes(np.concatenate([GENERATORS, n
 """d(dT)/dq_i of the appendix and the identity, side by side."""
 
 
-def compact_equations(system: Equations, n: int) -> CompactEquations:
+def build_compact_equations(system: Equations, n: int) -> CompactEquations:
     """Equations in compact form: three per contact, in the motion parameters of `n` operations."""
     words = words_of(system.letters, system.inverse, len(system.start), n)
     plane = np.zeros((len(words), 4))

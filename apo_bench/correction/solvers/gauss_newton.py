@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, turn_of
+from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, measure_largest_turn
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry import Array
 
@@ -80,7 +80,7 @@ class NearestPoses(NamedTuple):
         return NearestPoses(*fields)
 
 
-def nearest_poses(
+def find_nearest_poses(
     system: CompactEquations,
     poses: Array,
     L: Array,
@@ -111,7 +111,7 @@ def solve_batch(
     begin: Array | None = None,
     sparse: bool | None = None,
 ) -> NearestPoses:
-    """`nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
+    """`find_nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
 
     Args:
         sparse: Whether matrices are sparse, of a batch of one without shared errors; None leaves that to its size.
@@ -208,5 +208,5 @@ def settles(size: float, before: float, sure: float = SURE, following: float = N
 
 def shortened_step(step: Array, L: Array) -> Array:
     """A step (6 n,), shortened if a pose would turn further than `LARGEST_TURN`."""
-    (angle,) = turn_of(step[None], L[None]).tolist()
+    (angle,) = measure_largest_turn(step[None], L[None]).tolist()
     return step * (LARGEST_TURN / angle) if angle > LARGEST_TURN else step

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearise_densely
-from apo_bench.geometry import Array, exp_and_jacobian
+from apo_bench.geometry import Array, compute_exp_and_jacobian
 
 SURE = 1e-6
 NEXT = 1e-9
@@ -81,7 +81,7 @@ class DenseStep:
     def linearise(self, z: Array, rows: Rows) -> None:
         whole = len(rows) == len(self.T)
         some = slice(None) if whole else rows
-        T, B = poses_at(self._observed[some], self._L[some], z[some])
+        T, B = compute_poses_at(self._observed[some], self._L[some], z[some])
         (forms, e, _, _), J = linearise_densely(self._system if whole else self._system.only(rows), T, B)
         squares = np.einsum("bij,bij->b", J, J) / max(e.shape[1], 1)
         sizes = np.array([np.abs(e).max(axis=1, initial=0.0), (e * e) @ self._demanded, squares])
@@ -95,7 +95,7 @@ class DenseStep:
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
         some = slice(None) if len(rows) == len(self.T) else rows
         step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
-        return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
+        return step, np.abs(step).max(axis=1, initial=0.0), measure_largest_turn(step, self._L[some])
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
         self.T[which] = self._observed[which]
@@ -122,13 +122,13 @@ def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
     return np.asarray((Jt @ np.linalg.solve(A, wanted))[..., 0])
 
 
-def poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+def compute_poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
     """Poses T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
 
     Args:
         observed: (n, 4, 4) or (b, n, 4, 4); L is (b, n, 6, 6) or (b, n, 6, 6 n), and z (b, 6 n).
     """
-    D, Jr = exp_and_jacobian(twists(z, L))
+    D, Jr = compute_exp_and_jacobian(twists(z, L))
     return observed @ D, Jr @ L
 
 
@@ -138,7 +138,7 @@ def twists(z: Array, L: Array) -> Array:
     return np.asarray((L @ z.reshape(len(L), z.shape[1] // width, width, 1))[..., 0])
 
 
-def turn_of(step: Array, L: Array) -> Array:
+def measure_largest_turn(step: Array, L: Array) -> Array:
     """How far steps (b, 6 n) of z turn a pose at most, (b,), [rad]."""
     rotations = twists(step, L[:, :, 3:])
     return np.asarray(np.sqrt((rotations * rotations).sum(axis=2).max(axis=1, initial=0.0)))

@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import ADJOINTS, Array, remembered
+from apo_bench.geometry import ADJOINTS, Array, remember
 
 _ONE = np.eye(4)
 _HAT = np.ascontiguousarray(ADJOINTS[3:, :3, :3]).reshape(3, 9)
@@ -44,7 +44,8 @@ class Words:
     @cached_property
     def unknown(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The words and places, (u,), of the letters that are poses of operations."""
-        return np.nonzero((self.letters >= self.p) & (self.letters < self.p + self.n))
+        word, place = np.nonzero((self.letters >= self.p) & (self.letters < self.p + self.n))
+        return word, place
 
     @cached_property
     def operation(self) -> NDArray[np.intp]:
@@ -54,7 +55,8 @@ class Words:
     @cached_property
     def incidence(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Every pair of a contact and an unknown letter of its word, (i,)."""
-        return np.nonzero(self.of[:, None] == self.unknown[0])
+        contact, letter = np.nonzero(self.of[:, None] == self.unknown[0])
+        return contact, letter
 
     @cached_property
     def once(self) -> bool:
@@ -133,7 +135,7 @@ class Words:
         return np.where(self.inverse[self.unknown], -1.0, 1.0)[:, None, None]
 
 
-@remembered
+@remember
 def _among(words: Words, contacts: bytes) -> Words:
     """As of `Words.among`: relations are left out in turn of one assembly, again and again."""
     return Words(words.letters, words.inverse, words.of[np.frombuffer(contacts, dtype=np.bool_)], words.p, words.n)

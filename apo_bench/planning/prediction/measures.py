@@ -25,15 +25,15 @@ from apo_bench.assembly import (
     Operation,
     Plan,
     Poses,
-    apart_limit_mm,
-    contact_kind,
-    deep_limit_mm,
-    placements,
+    classify_contact,
+    compute_apart_limit_mm,
+    compute_deep_limit_mm,
+    compute_placements,
 )
 from apo_bench.geometry import Array
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.interference import depths_from_above, depths_on_way, physical_solids
-from apo_bench.planning.prediction.resting import between, enters, is_support, residual, resting_poses
+from apo_bench.planning.prediction.resting import enters, is_support, measure_contact, residual, resting_poses
 from apo_bench.planning.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
 
@@ -201,7 +201,7 @@ def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
 
 def _put(alone: Assembly, before: Poses, goal: Array) -> Poses:
     """All poses once the only operation has put its main part at a goal."""
-    return placements(alone, before, goal[None])[0]
+    return compute_placements(alone, before, goal[None])[0]
 
 
 def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
@@ -211,10 +211,10 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
     for contact in act.operation.contacts:
         if enters(act.alone, contact):
             deep_m, apart_m = _misfits_m(act, contact, how)
-            limit = deep_limit_mm(act.alone, contact, *lengths)
+            limit = compute_deep_limit_mm(act.alone, contact, *lengths)
             sides.append((1e3 * deep_m, limit))
             if 1e3 * apart_m > limit:
-                limit = apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
+                limit = compute_apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
             sides.append((1e3 * apart_m, limit))
     return Measure(act.number, "fit", *max(sides, key=lambda side: side[0] - side[1]))
 
@@ -238,8 +238,8 @@ def _misfits_m(act: _Act, contact: Contact, how: Attach | None) -> tuple[float, 
     are, across it.
     """
     way = None if how is None else act.planned[act.operation.main][:3, :3] @ how.direction
-    if contact_kind(*map(act.alone.face_of, contact)) not in ("plane on plane", "shaft on plane"):
-        lie = between(act.alone, contact, act.planned)
+    if classify_contact(*map(act.alone.face_of, contact)) not in ("plane on plane", "shaft on plane"):
+        lie = measure_contact(act.alone, contact, act.planned)
         if way is None:
             return lie.gap_m, lie.gap_m
         # Along the way the robot goes on until it feels contact, so only the part of each offset across it counts.

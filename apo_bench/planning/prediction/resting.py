@@ -14,8 +14,8 @@ from apo_bench.geometry import (
     Face,
     Mate,
     RoundFace,
-    mate,
-    overlap,
+    compute_overlap,
+    measure_mate,
     pose,
 )
 
@@ -48,10 +48,10 @@ def enters(assembly: Assembly, contact: Contact) -> bool:
     return assembly.is_fit(contact) or not on_plane
 
 
-def between(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
+def measure_contact(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
     """How the faces of a contact of round ones lie to each other."""
     m, e = contact
-    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+    return measure_mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
 
 
 def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, Array]:
@@ -65,11 +65,11 @@ def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array,
     T_e = poses[e.part]
     if assembly.is_round(contact):
         up = _up(assembly, contact, poses)
-        return between(assembly, contact, poses).off @ up, up * (
+        return measure_contact(assembly, contact, poses).off @ up, up * (
             -1.0 if m.face in assembly.solids[m.part].rounds else 1.0
         )
     plane = assembly.face(m).plane
-    common = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
+    common = compute_overlap(assembly.face(m), T_m, assembly.face(e), T_e)
     corners = common.corners if common and len(common.corners) else pose.apply(T_e, assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
     return (corners - T_m[:3, 3]) @ n + plane[3], n
@@ -104,7 +104,7 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
-    touch = between(assembly, contact, poses)
+    touch = measure_contact(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
     off = touch.off.mean(axis=0)

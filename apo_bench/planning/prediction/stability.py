@@ -10,8 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses, placements
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, all_boxes, mate, overlap, pose
+from apo_bench.assembly import Assembly, Contact, Operation, Poses, compute_placements
+from apo_bench.geometry import (
+    Array,
+    Face,
+    RoundFace,
+    all_boxes,
+    compute_overlap,
+    find_direction_across,
+    measure_mate,
+    pose,
+)
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
@@ -46,7 +55,7 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
     Returns:
         The operation, or None if every part would stand.
     """
-    every = zip(assembly.operations, placements(assembly, start, goals), strict=True)
+    every = zip(assembly.operations, compute_placements(assembly, start, goals), strict=True)
     return next(
         (k for k, (operation, poses) in enumerate(every) if imbalance(assembly, operation, poses) > BALANCED), None
     )
@@ -103,7 +112,7 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
     for m, e in operation.contacts:
         up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
         if abs(up) >= _LEVEL:
-            corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+            corners = compute_overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
             ups.append(float(np.sign(up)))
             points.append(corners)
             signs.append(np.full(len(corners), ups[-1]))
@@ -162,9 +171,9 @@ def pushes(assembly: Assembly, contact: Contact, poses: Poses) -> Pushes:
     T_rests = poses[e.part]
     if isinstance(moved, Face) and isinstance(rests, Face):
         n = (T_rests[:3, :3] @ rests.normal)[None]
-        points = overlap(moved, T, rests, T_rests).corners
+        points = compute_overlap(moved, T, rests, T_rests).corners
         return Pushes(points, np.repeat(n, len(points), axis=0), n)
-    between = mate(moved, T, rests, T_rests)
+    between = measure_mate(moved, T, rests, T_rests)
     at = between.points if between.common else nothing
     if isinstance(rests, Face):
         assert isinstance(moved, RoundFace)
@@ -186,7 +195,7 @@ def _along(n: Array, at: Array, out: float) -> Pushes:
 
 def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
     """The directions from the axis to a round wall, and those in which it pushes there, (8, 3) each."""
-    x = across_axis(axis)
+    x = find_direction_across(axis)
     around = np.outer(np.cos(_TURNS), x) + np.outer(np.sin(_TURNS), np.cross(axis, x))
     sign = -1.0 if rests.hole else 1.0
     return around, sign * (np.sqrt(1.0 - sine**2) * around - sine * axis)

@@ -10,9 +10,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, frozen, is_rigid, pose
+from apo_bench.geometry import Array, copy_frozen, is_rigid, pose
 
-WORKSPACE_MIDDLE_M = frozen([0.12, 0.0, 0.03], 3)
+WORKSPACE_MIDDLE_M = copy_frozen([0.12, 0.0, 0.03], 3)
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
 CAMERA_DISTANCE_M = 0.9
 CAMERA_ELEVATION_DEG = 40.0
@@ -43,7 +43,7 @@ class Camera:
     """(4, 4), axes of OpenCV, [m]."""
 
     def __post_init__(self) -> None:
-        T = frozen(self.T_world_camera, 4, 4)
+        T = copy_frozen(self.T_world_camera, 4, 4)
         require(
             is_rigid(T[None])[0],
             "the pose of a camera was given that is not rigid; give a rotation and a place in metres.",
@@ -71,7 +71,7 @@ class Camera:
     def twists(self, poses: Array, errors: Array) -> Array:
         """Body twists (n, 6) of errors that are given in the frames of the rays.
 
-        Turn first, then shift in the frame that is seen: xi = (R_seen^t F d, R^t F w), R_seen = R exp(R^t F w). The
+        Turn first, then shift in the frame that is seen: xi = (R_obs^t F d, R^t F w), R_obs = R exp(R^t F w). The
         twist is thus linear in the error, and with covariance S in the frame of the ray its own is exactly that of
         `covariance` for that ray, since a turn leaves its own axis where it is.
 
@@ -82,8 +82,8 @@ class Camera:
         frames = self.frames(poses)
         turn = np.zeros((len(poses), 6))
         turn[:, 3:] = np.einsum("nji,njk,nk->ni", poses[:, :3, :3], frames, errors[:, 3:])
-        R_seen = (poses @ pose.exp(turn))[:, :3, :3]
-        shift = np.einsum("nji,njk,nk->ni", R_seen, frames, errors[:, :3])
+        R_obs = (poses @ pose.exp(turn))[:, :3, :3]
+        shift = np.einsum("nji,njk,nk->ni", R_obs, frames, errors[:, :3])
         return np.concatenate([shift, turn[:, 3:]], axis=1)
 
     def covariance(self, seen: Array, errors: Array) -> Array:

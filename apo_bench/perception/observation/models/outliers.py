@@ -6,8 +6,8 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
-from apo_bench.geometry import Array, frozen
+from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, make_measured_model
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
@@ -16,13 +16,13 @@ MISSES = 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
 OUTLIER_TIMES = 10.0
 """An outlier errs by so many times the level."""
-UNSEEN_DEVIATION = frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
+UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
 """Standard deviation that is stated of what was not seen, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True)
-class Outliers:
+class OutlierNoise:
     """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
     What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
@@ -36,21 +36,21 @@ class Outliers:
     times: float = OUTLIER_TIMES
 
     FACTS: ClassVar[Facts] = Facts(
-        title="gross outliers that do not say so, and operations that are missed",
-        formula=("T_seen = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: seen = false"),
-        frame="of the part that is seen, the same in every direction",
+        title="gross outliers that are not marked, and missed operations",
+        formula=("T_obs = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: observed = false"),
+        frame="of the observed part, isotropic",
         parameters=(
-            f"p = {OUTLIERS:g}: share of outliers among what is seen",
+            f"p = {OUTLIERS:g}: share of outliers among the observed operations",
             f"q = {MISSES:g}: share of misses",
             f"m = {OUTLIER_TIMES:g}: an outlier errs m times as much",
         ),
         states=(
-            f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
+            f"L^2, the covariance of inliers; that of all errors is 1 + p (m^2 - 1) = "
             f"{1.0 + OUTLIERS * (OUTLIER_TIMES**2 - 1.0):g} times as large"
         ),
         notes=(
-            f"A missed operation has the pose at which its part was seen last, or started, with "
-            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods refuse it",
+            f"A missed operation has the last observed pose of its part, or its start, with "
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods reject it",
             "At level 0 nothing is missed",
         ),
     )
@@ -64,13 +64,13 @@ class Outliers:
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
         poses = seen.poses.copy()
         covariance = seen.covariance.copy()
-        poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
+        poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
-        stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
+        stated = make_measured_model(0.0, self.outliers, self.times) if self.times > 1.0 else None
         return replace(seen, poses=poses, covariance=covariance, observed=~missed, outliers=stated)
 
 
-def last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
+def find_last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
     """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
     now = dict(start)
     out = poses.copy()

@@ -123,18 +123,18 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
     R = truth.R[found]
-    R_seen = estimates.R[partner[found]]
+    R_obs = estimates.R[partner[found]]
     right = pose.nearest_rotations(R)
-    turn = Rotation.from_matrix(pose.nearest_rotations(R_seen) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
+    turn = Rotation.from_matrix(pose.nearest_rotations(R_obs) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
     moved = estimates.t_mm[partner[found]] - truth.t_mm[found]
-    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_seen))
+    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_obs))
     shift[found] = np.einsum("nji,nj->ni", F, moved)
     turned[found] = np.einsum("nji,nj->ni", F, turn)
-    # trace(R_seen R^t) = 1 + 2 cos(angle).
+    # trace(R_obs R^t) = 1 + 2 cos(angle).
     trace = np.full(n, np.nan)
-    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_seen, R) - 1.0) / 2.0, -1.0, 1.0)))
+    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_obs, R) - 1.0) / 2.0, -1.0, 1.0)))
     return Residuals(
         where=truth.where,
         shift_mm=shift,
@@ -149,7 +149,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
 
 
 def _about_fixed_points(
-    objects: NDArray[np.int64], moved: Array, R: Array, R_seen: Array
+    objects: NDArray[np.int64], moved: Array, R: Array, R_obs: Array
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which gross estimates only turn a part about a point that is fixed in it, and all shifts, of theirs that point.
 
@@ -160,13 +160,13 @@ def _about_fixed_points(
     Args:
         objects: (n,), of each estimate.
         moved: (n, 3), from the true to the estimated origin, camera axes, mm.
-        R: (n, 3, 3), true rotations; R_seen are the estimated ones.
+        R: (n, 3, 3), true rotations; R_obs are the estimated ones.
 
     Returns:
         (n,) and (n, 3), mm.
     """
     off = np.linalg.norm(moved, axis=1)
-    D = np.swapaxes(R, 1, 2) @ R_seen - np.eye(3)
+    D = np.swapaxes(R, 1, 2) @ R_obs - np.eye(3)
     t = np.einsum("nji,nj->ni", R, moved)
     # |R - I| = 2 sqrt(2) sin(angle / 2) for the Frobenius norm.
     is_turned = np.linalg.norm(D, axis=(1, 2)) >= 2.0 * np.sqrt(2.0) * np.sin(np.radians(TURNED_DEG) / 2.0)
@@ -187,7 +187,7 @@ def _about_fixed_points(
                 break
             c = np.linalg.lstsq(D[agree].reshape(-1, 3), -t[agree].reshape(-1), rcond=0.1)[0]
             stands = left[_point_off(D[left], t[left], c) < INLIER_MM]
-            shifts[stands] = moved[stands] + (R_seen[stands] - R[stands]) @ c
+            shifts[stands] = moved[stands] + (R_obs[stands] - R[stands]) @ c
             beside[stands] = True
             left = np.setdiff1d(left, np.union1d(stands, agree))
     return beside, shifts

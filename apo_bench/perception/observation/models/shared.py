@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, correlate_first_order
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import observe_displaced, observe_shared
@@ -13,14 +13,14 @@ from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OWN = 1.0 / 20.0
 """What operations that share an error err by themselves, as part of the level."""
-OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
+OWN_FACT = f"o = {OWN:g}: independent error of each operation over the level"
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""
 
 
 @final
 @dataclass(frozen=True)
-class Bias:
+class BiasNoise:
     """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
 
     Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
@@ -31,10 +31,10 @@ class Bias:
 
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error per part, the same in every operation that moves it",
-        formula=("T_seen_k = T_k exp(L e_part + o L e_k)",),
+        formula=("T_obs_k = T_k exp(L e_part + o L e_k)",),
         frame="of the part: as if the origin of its model were in the wrong place",
         parameters=(OWN_FACT,),
-        states="(1 + o^2) L^2 in every direction, over seeds, and that operations share L^2 of it, one error per part",
+        states="(1 + o^2) L^2 in every direction, of which operations of one part share L^2",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -54,7 +54,7 @@ class Bias:
 
 @final
 @dataclass(frozen=True, eq=False)
-class BiasView:
+class ViewBiasNoise:
     """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
 
     What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
@@ -69,11 +69,10 @@ class BiasView:
 
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error of the view, common to all parts and operations",
-        formula=("T_seen_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
+        formula=("T_obs_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
         frame="P with the axes of the camera, in the middle of all poses",
         parameters=(OWN_FACT,),
-        states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, over seeds, and that operations share the first: parts far "
-        "from the middle are less well placed",
+        states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, of which operations share the first term",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -93,7 +92,7 @@ class BiasView:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Correlated:
+class CorrelatedNoise:
     """Isotropic Gaussian noise whose errors follow a first-order autoregression from operation to operation.
 
     It drifts in the axes of the camera, whatever part is moved, as with a mount that warms up. After any number of
@@ -106,10 +105,10 @@ class Correlated:
 
     FACTS: ClassVar[Facts] = Facts(
         title="errors that drift: correlated from operation to operation",
-        formula=("z_1 = e_1, z_k = rho z_(k-1) + sqrt(1 - rho^2) e_k", "T_seen_k = T_k exp(L A_k^t z_k + o L e_k)"),
+        formula=("z_1 = e_1, z_k = rho z_(k-1) + sqrt(1 - rho^2) e_k", "T_obs_k = T_k exp(L A_k^t z_k + o L e_k)"),
         frame="the axes of the camera, into which A_k turns those of the part",
         parameters=(f"rho = {CORRELATION:g}: correlation of the errors of an operation and the next", OWN_FACT),
-        states="(1 + o^2) L^2 in every direction for each operation, and how operations are correlated; both are exact",
+        states="(1 + o^2) L^2 in every direction and the correlation of operations, both exact",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -121,12 +120,12 @@ class Correlated:
         in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
         xi = np.zeros((len(assembly), 6))
         xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], in_world[:, 1])
-        R_seen = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
-        xi[:, :3] = np.einsum("nji,nj->ni", R_seen, in_world[:, 0])
+        R_obs = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
+        xi[:, :3] = np.einsum("nji,nj->ni", R_obs, in_world[:, 0])
 
         def shared(poses: Array) -> list[SharedError]:
             every = tuple(range(len(assembly)))
-            between = first_order(len(every), self.correlation)
+            between = correlate_first_order(len(every), self.correlation)
             T = self.camera.T_world_camera
             return [SharedError("drift", every, np.diag(sigma**2), T, local=True, correlation=between)]
 
