@@ -19,7 +19,8 @@ from apo_bench.io import check_target, group_by, save_figure, use_figure_style, 
 _STATUS = (
     "A `self-reported` entry is unverified, since anyone can draw public seeds again. The author of this table ran "
     "`verified` entries with trials of a secret seed, whose hash was published before; entrants that are not trusted "
-    "ran as programs, which get observations and nothing else. `quick` entries ran a few trials, which are no score."
+    "ran as programs, which get observations and nothing else. `real` entries are forms of trials with a real robot. "
+    "`quick` entries ran a few trials, which are no score."
 )
 _RATES = (
     "Success rate in percent, mean over the conditions of a track, with its 95 % interval over seeds. In brackets: the "
@@ -41,7 +42,8 @@ class Line(NamedTuple):
 
     @property
     def status(self) -> str:
-        return ("verified" if self.verified else "self-reported") + ", quick" * self.entry.quick
+        status = "verified" if self.verified else "self-reported"
+        return "real, " * self.entry.real + status + ", quick" * self.entry.quick
 
 
 def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset()) -> list[Line]:
