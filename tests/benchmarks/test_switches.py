@@ -41,30 +41,6 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
     assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4"}
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize(
-    ("plain", "words"),
-    [
-        (replace(BARE, numpy=("X86_V3",)), r"is not run: \('X86_V3',\) stay on"),
-        ("a process under it ended with 1", "is not run: a process under it ended with 1"),
-    ],
-)
-def test_features_that_stay_on_are_named(monkeypatch: pytest.MonkeyPatch, plain: Kernels | str, words: str) -> None:
-    (said,) = found(monkeypatch, OWN, {}, plain)
-    assert re.search(words, said)
-
-
-def test_where_there_is_nothing_to_switch_nothing_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither OpenBLAS nor any feature above the least, as on some machines that are not x86."""
-    none = Kernels((), ())
-    assert found(monkeypatch, none, {"Haswell": OWN}, none) == [
-        "vector features off is not run again: NumPy uses none on this processor",
-        "Haswell is not run: neither NumPy nor SciPy uses OpenBLAS",
-    ]
-
-
-=======
->>>>>>> int
 def test_a_process_says_when_it_has_not_the_kernels_that_it_was_started_for(monkeypatch: pytest.MonkeyPatch) -> None:
     here = switches.in_use()
     monkeypatch.setenv(EXPECTED, json.dumps(asdict(here)))

@@ -100,19 +100,6 @@ def test_draws_fill_their_ranges_and_stay_inside(name: str):
     assert np.abs(np.corrcoef(drawn) - np.eye(len(drawn))).max() < 0.3, "draws are independent"
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_starts_are_those_of_the_file(name: str):
-    """With a clearance the stick, which lies on a fit face, lies that much lower; nothing else moves."""
-    scenario = SCENARIOS[name]
-    for clearance_mm in (0.0, 0.25):
-        start = draw_layout(scenario, np.random.default_rng([5, 0]), clearance_mm).start
-        for part, T in scenario.start.items():
-            if part in scenario.follows_site:
-                continue
-            drop = 1e-3 * clearance_mm if part == "stick" else 0.0
-            assert start[part] == pytest.approx(pose.at((0, 0, -drop)) @ T, abs=1e-15)
-
-
 @pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (-0.03, 0.01, 0.0)])
 def test_a_turn_is_one_about_its_point_and_leaves_what_shifts_draw(point: tuple[float, float, float]):
     """The point stays where it is, the part turns by what was asked, and shifts of the same seed stay the same."""

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, find_faces_away, measure_largest_gap
+from apo_bench.assembly import find_faces_away, measure_largest_gap
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -87,22 +87,6 @@ def test_what_was_missed_is_inferred(name):
     assert found.left_out == (n - 2,)
     assert found.sentence.endswith(f"not seen: operation {n - 1}")
     assert correct(observation, "contact").status == "not_seen"
-
-
-def test_a_single_operation_that_was_seen_turned_is_turned_back():
-    """Its contact with the table is not blamed in its place."""
-    made = look("block_on_block", 0)
-    single = replace(made.assembly, operations=made.assembly.operations[:1])
-    about_y = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
-    turned = made.poses[:1] @ about_y
-    stated = OutlierModel(gross=0.3)
-    one = {"poses": turned, "covariance": made.covariance[:1], "observed": made.observed[:1]}
-    observation = replace(made, assembly=single, outliers=stated, **one)
-    found = correct(observation, "contact-robust")
-    assert found.ok
-    assert found.dropped == ()
-    assert "seen turned: operation 1" in found.sentence
-    assert not find_faces_away(single, made.start, found.poses).any()
 
 
 def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():

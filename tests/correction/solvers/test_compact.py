@@ -8,15 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-<<<<<<< HEAD
-from apo_bench.assembly import Equations, build_contact_equations, compute_placements
-from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by, moments
-from apo_bench.geometry import Array, pose
-=======
 from apo_bench.assembly import Equations, build_contact_equations
-from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, moments
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by, moments
 from apo_bench.geometry import Array
->>>>>>> int
 from tests import scenes
 from tests.assembly.test_equations import random_scene
 

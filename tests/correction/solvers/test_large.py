@@ -130,18 +130,3 @@ def test_the_corrector_takes_many_operations_whole() -> None:
     assert made.test.freedom == made.rank
     assert 0.0 < made.test.p_value < 1.0
     assert made.covariance is None
-<<<<<<< HEAD
-
-
-def test_rounding_does_not_stop_the_banded_solver() -> None:
-    """With nothing on the diagonal, redundant equations leave a matrix that is not positive definite."""
-    scene = of_problem("chain10")
-    system = system_of(scene, scene.goals)
-    where = sparse.incidence(system)
-    known = system.linearise(scene.goals, None)
-    found = np.swapaxes(known.rows[where.contact] @ known.turned[where.letter], 1, 2)
-    right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.goals)))
-    z = sparse.sparse_solver(where)(np.zeros(len(right)), found, right)
-    assert_allclose(where.times(found, z), right, rtol=0, atol=1e-6 * np.abs(right).max())
-=======
->>>>>>> int
