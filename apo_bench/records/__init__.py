@@ -2,11 +2,12 @@
 
 from apo_bench.records.contact_sources import (
     DETECTED,
+    FACE_OFFSET_MM,
     GIVEN,
-    SHIFT_MM,
     WRONG,
     WRONG_CONTACTS,
     normalise_contact_source,
+    parse_face_offset,
 )
 from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, FtNoise, normalise_ft_sensor, parse_ft_noise
 from apo_bench.records.limits import USUAL_LIMITS, Limits
@@ -89,6 +90,7 @@ __all__ = (
     "DETECTED",
     "ENV_ID",
     "EVALUATION_STARTS",
+    "FACE_OFFSET_MM",
     "FAILURES",
     "FIRST_TRAINING_TRIAL",
     "FOREIGN_ARMS",
@@ -106,7 +108,6 @@ __all__ = (
     "REQUIRED",
     "RESIDUALS",
     "SETTINGS",
-    "SHIFT_MM",
     "SIMULATED",
     "STAGES",
     "USUAL",
@@ -152,6 +153,7 @@ __all__ = (
     "normalise_robot_error",
     "open_secret_seed",
     "parse_assumed_error",
+    "parse_face_offset",
     "parse_ft_noise",
     "parse_method",
     "parse_noise_level",

@@ -19,9 +19,9 @@ _THROUGH = 1e-3
 
 @lru_cache(maxsize=32)
 def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
-    """The operations of a scenario at its nominal goals."""
+    """The operations of a scenario at its nominal poses."""
     lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, lines)
+    return understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
 
 
 def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
@@ -31,9 +31,9 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
         stated: What the file says of them.
 
     Raises:
-        InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
+        InputError: A stated direction leads through what the part has to touch, or a stated line begins inside of it.
     """
-    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, stated)
+    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated)
     for each, preference in zip(operations, stated, strict=True):
         _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in operations))

@@ -74,7 +74,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Err
 def nominal_demonstration() -> Demonstration:
     """The demonstration of an ideal human: the nominal poses of example 5.1, in the middle of their place."""
     scenario = load_scenario(SCENARIO)
-    poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.goals
+    poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.nominal_poses
     final = compute_placements(scenario.assembly, scenario.start, poses)[-1]
     return Demonstration(scenario.assembly, scenario.start, poses, final, np.zeros((len(poses), 6, 6)))
 

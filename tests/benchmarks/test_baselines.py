@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-import pytest
-
 from apo_bench import load_scenario
-from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.scenario.file import list_scenario_names
-from benchmarks.baselines import COLUMNS, Count, Place, count, difficulty, read_counts
-from benchmarks.provenance import share_of_sweep, trials_of
+from benchmarks.baselines import COLUMNS, Place, difficulty, read_counts
+from benchmarks.provenance import trials_of
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -43,24 +40,3 @@ def test_the_table_has_every_scenario_and_count() -> None:
     assert [cell.strip() for cell in row.split("|")[2:-1]] == [
         str(counts[Place("peg_in_hole", *column)]) for column in COLUMNS
     ]
-
-
-def test_trials_whose_demonstration_failed_do_not_count() -> None:
-    row = {"scenario": "a", "method": "uncorrected", "noise_mm": 2.0}
-    rows = [{**row, "success": success} for success in (True, False, None)]
-    assert count(rows) == {Place("a", "uncorrected", 2.0): Count(2, 1)}
-
-
-@pytest.mark.parametrize("name", ["headline", "robust", "round", "gearbox", "arms", "robot_errors", "baselines"])
-def test_every_sweep_has_the_baselines(name: str) -> None:
-    methods = {method for grid in read_sweep(BENCHMARKS / f"{name}.toml") for method in grid.method}
-    assert methods >= {"snap", "snap+spiral", "nominal"}
-
-
-def test_a_trial_that_a_sweep_file_names_twice_counts_once(tmp_path: Path) -> None:
-    path = tmp_path / "sweep.toml"
-    path.write_text(
-        'scenario = ["block_on_block"]\nnoise_level = [1]\nhuman_error_scale = [0]\n'
-        'method = ["uncorrected", "oracle"]\ntrials = 3\n[[also]]\nmethod = ["uncorrected"]\ntrials = 5\n'
-    )
-    assert share_of_sweep(2, path, path).startswith("The page holds 2 of the 8 trials of `benchmarks/sweep.toml`")

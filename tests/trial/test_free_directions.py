@@ -10,19 +10,23 @@ from hypothesis import strategies as st
 from apo_bench import Observation
 from apo_bench.assembly import build_contact_equations
 from apo_bench.geometry import Array
-from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
+from apo_bench.trial.free_directions import FreeSpace, free_space, nearest_fitting, shortest_above
 from tests import scenes
 
 
 def is_uncorrected(scene: scenes.Scene) -> Observation:
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     return Observation(
-        scene.assembly, scene.start, scene.goals, np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)), np.ones(n, bool)
+        scene.assembly,
+        scene.start,
+        scene.nominal_poses,
+        np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)),
+        np.ones(n, bool),
     )
 
 
 def space_of(scene: scenes.Scene) -> FreeSpace:
-    found = free_space(is_uncorrected(scene), scene.goals)
+    found = free_space(is_uncorrected(scene), scene.nominal_poses)
     assert found is not None
     return found
 
@@ -43,27 +47,12 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
     assert (factors > -1e-7).all()
 
 
-def test_what_cannot_be_has_no_shortest_point() -> None:
-    assert shortest_above(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0])) is None
-    assert shortest_above(np.zeros((1, 3)), np.ones(1)) is None
-
-
-@pytest.mark.parametrize("dimensions", [1, 12])
-def test_even_points_come_nearest_first_and_are_spread_as_a_normal_distribution(dimensions: int) -> None:
-    points = np.array(list(even_points(dimensions)))
-    lengths = np.linalg.norm(points, axis=1)
-    assert (np.diff(lengths) >= 0.0).all()
-    np.testing.assert_allclose(points.mean(axis=0), 0.0, atol=0.25)
-    np.testing.assert_allclose(points.std(axis=0), 1.0, atol=0.25)
-    np.testing.assert_array_equal(points, np.array(list(even_points(dimensions))))
-
-
 @pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])
 def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     space = space_of(scene)
-    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.goals, atol=1e-15)
+    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.nominal_poses, atol=1e-15)
     for _ in range(3):
         s = 3.0 * rng.normal(size=len(space))
         goals = space.place(s)
@@ -72,44 +61,14 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
         np.testing.assert_allclose(goals[:, :3, 3], space.tangent(s)[:, :3, 3], atol=3e-3)
 
 
-def test_contacts_that_are_open_may_stay_open() -> None:
-    """Only what holds is held: the castle that stands 1 mm aside is no reason to move it."""
-    scene = scenes.stick_in_tower()
-    goals = scene.goals.copy()
-    goals[2] = goals[2] @ scenes.mm(0, 1, 0)
-    space = free_space(is_uncorrected(scene), goals)
-    assert space is not None
-    assert len(space) > len(space_of(scene))
-    before = build_contact_equations(scene.assembly, scene.start, goals).gaps(goals)
-    moved = space.place(np.full(len(space), 0.5))
-    assert moved is not None
-    after = build_contact_equations(scene.assembly, scene.start, moved).gaps(moved)
-    assert (after[before < 1e-9] < 1e-9).all()
-
-
-def test_the_nearest_place_is_found_by_linearising() -> None:
-    """A wall that all goals are to be beyond: the answer is its nearest point, in standard deviations."""
-    space = space_of(scenes.stick_in_tower())
-    axis = np.eye(len(space))[1]
-
-    def excess(goals: Array) -> Array:
-        return np.array([1e3 * (space.goals - goals)[:, 0, 3].sum() + 2.0])
-
-    found = nearest_fitting(space, lambda goals: True, excess)
-    assert found is not None
-    assert excess(found)[0] <= 0.0
-    assert excess(found)[0] > -0.2
-    assert excess(space.tangent(0.0 * axis))[0] == pytest.approx(2.0)
-
-
 def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_is_gone() -> None:
     space = space_of(scenes.stick_in_tower())
 
     def flat(goals: Array) -> Array:
-        far = 1e3 * np.abs(goals - space.goals)[:, :3, 3].max()
+        far = 1e3 * np.abs(goals - space.poses)[:, :3, 3].max()
         return np.array([1.0 if far < 1.0 else -1.0])
 
     found = nearest_fitting(space, lambda goals: True, flat)
     assert found is not None
-    assert 1.0 <= 1e3 * np.abs(found - space.goals)[:, :3, 3].max() < 1.5
+    assert 1.0 <= 1e3 * np.abs(found - space.poses)[:, :3, 3].max() < 1.5
     assert nearest_fitting(space, lambda goals: False, flat) is None

@@ -27,12 +27,7 @@ EVIL = """from pathlib import Path
 Path("touched").write_text("evil code ran")
 raise SystemExit
 """
-NAMES = (
-    {"arm": "evil:arm"},
-    {"method": "evil:correct"},
-    {"noise": "evil:noise"},
-    {"contact_source": "evil:told"},
-)
+NAMES = ({"arm": "evil:arm"}, {"method": "evil:correct"}, {"noise": "evil:noise"}, {"contact_source": "evil:told"})
 DANGEROUS = (
     *('<script>alert("1")</script>', "$(touch x)", "; rm -r .", "`touch x`", "'; touch x; '", "-x", "a b", "&&"),
     *("[/red]", "--video=x.mp4"),
@@ -76,7 +71,15 @@ def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     [
         ({"noise": "my noise.toml"}, ()),
         ({"noise": "flips:p=0.1/r=0.5"}, ()),
-        ({"noise": "empirical:mine.csv", "contact_source": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
+        (
+            {
+                "noise": "empirical:mine.csv",
+                "contact_source": "face-offset:3mm",
+                "method": "contact",
+                "arm": "six_axis",
+            },
+            (),
+        ),
         *((names, tuple(names.values())) for names in NAMES),
     ],
 )

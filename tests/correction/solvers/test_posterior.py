@@ -15,19 +15,14 @@ from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import find_nearest_poses
-from apo_bench.correction.solvers.posterior import (
-    compute_freedom,
-    compute_jacobian_rank,
-    compute_projections,
-    settle_basis,
-)
+from apo_bench.correction.solvers.posterior import compute_freedom, compute_jacobian_rank
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
 
 
 def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
-    goals = twisted(scene.goals, L, np.random.default_rng(seed))
+    goals = twisted(scene.nominal_poses, L, np.random.default_rng(seed))
     return replace(scenes.seen(scene, goals), covariance=L @ np.swapaxes(L, 1, 2))
 
 
@@ -36,9 +31,9 @@ def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
 def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(seed)
-    n = len(scene.goals)
-    L = crooked(len(scene.goals), rng, 5.0, 3.0)
-    seen = twisted(scene.goals, L, rng)
+    n = len(scene.nominal_poses)
+    L = crooked(len(scene.nominal_poses), rng, 5.0, 3.0)
+    seen = twisted(scene.nominal_poses, L, rng)
     system = system_of(scene, seen)
     found = find_nearest_poses(system, seen, L)
     known = compute_freedom(found.Jt)
@@ -53,36 +48,17 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     assert np.abs(found.z @ known.free).max() <= 1e-6
 
 
-def test_observations_together_have_the_rank_and_the_projection_of_each() -> None:
-    """Also where the columns that span the first do not span another one, or one has fewer, or none."""
-    rng = np.random.default_rng(3)
-    J = rng.standard_normal((6, 8, 12))
-    J[0, 4:] = rng.standard_normal((4, 4)) @ J[0, :4]
-    J[1, 4:] = rng.standard_normal((4, 4)) @ J[1, :4]
-    J[2, :4] = rng.standard_normal((4, 3)) @ J[2, 4:7]
-    J[3, 1] = J[3, 0] * (1.0 + 1e-15)
-    J[4] = 0.0
-    rank, P = compute_projections(np.swapaxes(J, 1, 2))
-    assert rank == [4, 4, 4, 7, 0, 8]
-    assert P is not None
-    for each, free, fixed in zip(J, P, rank, strict=True):
-        N = np.linalg.svd(each)[2][fixed:]
-        assert_allclose(free, N.T @ N, rtol=0, atol=1e-9)
-    alone = [compute_projections(np.swapaxes(each, 0, 1)[None])[0][0] for each in J]
-    assert alone == rank
-
-
 @pytest.mark.parametrize(("name", "correlated"), [("stick_in_tower", False), ("pockets", True)])
 def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> None:
     """Errors of corrected goals over 400 draws; what is stated to be fixed is fixed."""
     scene = scenes.ALL[name]()
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
     errors = np.zeros((400, n, 6))
     stated = np.zeros((n, 6, 6))
     for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))], contact)):
         assert made.covariance is not None
-        errors[seed] = pose.log(pose.inverse(made.poses) @ scene.goals)
+        errors[seed] = pose.log(pose.inverse(made.poses) @ scene.nominal_poses)
         stated += made.covariance / len(errors)
     empirical = np.einsum("sni,snj->nij", errors, errors) / len(errors)
     deviation = np.sqrt(np.einsum("nii->ni", stated))
@@ -107,19 +83,7 @@ def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correctio
 @pytest.mark.parametrize(("level", "low", "high"), [(0.95, 0.90, 0.99), (0.5, 0.41, 0.59)])
 def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, high: float) -> None:
     scene, seen, made = corrected_towers()
-    held = [contains_truth(one, found, scene.goals, level) for one, found in zip(seen, made, strict=True)]
+    held = [contains_truth(one, found, scene.nominal_poses, level) for one, found in zip(seen, made, strict=True)]
     assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
-
-
-@pytest.mark.parametrize("free", [1, 9])
-def test_a_settled_basis_is_of_the_span_alone(free: int) -> None:
-    """Whatever basis a decomposition returns, and whatever its last digits are."""
-    rng = np.random.default_rng(free)
-    for _ in range(5):
-        N = np.linalg.qr(rng.standard_normal((30, free)))[0]
-        turned = N @ np.linalg.qr(rng.standard_normal((free, free)))[0]
-        settled = settle_basis(N)
-        assert_allclose(settled @ settled.T, N @ N.T, rtol=0, atol=1e-12)
-        assert_allclose(settle_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)

@@ -32,7 +32,7 @@ def walled(scene: scenes.Scene, name: str, gap: Gap) -> Assembly:
 def in_the_play(scene: scenes.Scene, name: str, half_m: float, rng: np.random.Generator) -> Array:
     """True goals, the last part anywhere in its slot or pocket."""
     x, y = rng.uniform(-half_m, half_m, 2)
-    goals = np.array(scene.goals)
+    goals = np.array(scene.nominal_poses)
     goals[-1] = goals[-1] @ pose.at((x if name == "pockets" else 0.0, y, 0.0))
     return goals
 
@@ -80,7 +80,7 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
     """Noise of the second level is so large beside a slot of 0.2 mm that linearised walls leave no room at first."""
     scene = scenes.ALL[name]()
     half_m = 0.5e-3 * clearance_mm
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     assembly = walled(scene, name, Gap("clearance", -half_m, half_m))
     touched = 0
     for seed in range(10):
@@ -97,20 +97,3 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
         assert unbalanced(seen, made.poses) <= 1e-6
         touched += beyond(seen, made.poses) > -1e-9
     assert touched > 0
-
-
-@pytest.mark.parametrize("intervals_mm", [((1.0, 2.0), (0.0, 1.0)), ((-9.0, -8.0), (-9.0, 0.0))])
-def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    """Both sides of a stick as wide as its slot: their distances add up to nothing."""
-    scene = scenes.stick_on_castles()
-    L = scales(3, 2.0, 1.0)
-    sides = [
-        c for c in scene.assembly.operations[2].contacts if c.environment in ((("castle1"), "spy"), ("castle1", "sny"))
-    ]
-    gaps = {c: Gap("clearance", 1e-3 * low, 1e-3 * high) for c, (low, high) in zip(sides, intervals_mm, strict=True)}
-    seen = look(replace(scene.assembly, gaps=gaps), scene, twisted(scene.goals, L, np.random.default_rng(0)), L)
-    for name in ("contact", "contact-refuse", "contact-drop"):
-        made = correct(seen, name)
-        assert made.status == "inconsistent"
-        assert made.covariance is None
-        assert made.gap_after_m > seen.gap_m

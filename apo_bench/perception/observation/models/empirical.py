@@ -32,7 +32,7 @@ _LARGEST_DEG = 180.01
 @final
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Residuals to draw from, as errors in the frames of rays, [m, rad], whose shift acts in the frame that is seen."""
+    """Residuals to draw from, as errors in the frames of rays, [m, rad]; a shift acts in the observed frame."""
 
     inliers: Array
     """(k, 6), those that are not turned."""
@@ -60,7 +60,7 @@ class EmpiricalNoise:
 
     It is taken as it is or with the opposite sign, both equally often, so that it is 0 in the mean: a bias of the
     estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
-    is not known, as the part looks alike when turned, are left out.
+    is not known, as the part looks the same when turned, are left out.
     """
 
     sample: Sample

@@ -19,7 +19,7 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 RATE = 0.3
-"""Share of operations that are seen falsely."""
+"""Share of operations that are observed wrongly."""
 NEAREST_M = 0.02
 FARTHEST_M = 0.06
 """An error along the ray."""
@@ -72,7 +72,7 @@ class CameraFailures:
 
     @property
     def FACTS(self) -> Facts:
-        """What its card prints."""
+        """What its sheet prints."""
         formula = ", or ".join(failure.formula for failure in self.failures)
         notes = [note for failure in self.failures for note in failure.notes]
         return Facts(
@@ -134,7 +134,7 @@ def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
 
 
 def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
+    """Parts are observed turned by an approximate symmetry, T F; a part without one is observed correctly."""
     assembly = shown.assembly
     for k in draw_failing(len(poses), rate, rng):
         turns = find_approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
@@ -143,7 +143,7 @@ def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _leave_behind(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen where they were before the operation moved them."""
+    """Parts are observed where they were before the operation moved them."""
     before = (shown.start, *compute_placements(shown.assembly, shown.start, shown.poses))
     for k in draw_failing(len(poses), rate, rng):
         poses[k] = before[k][shown.assembly.operations[k].main]
@@ -166,7 +166,7 @@ def _swap(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _shift_along_ray(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen 20 to 60 mm too near or too far, on the ray of the camera."""
+    """Parts are observed 20 to 60 mm too near or too far, on the ray of the camera."""
     rays = camera.rays(poses)
     for k in draw_failing(len(poses), rate, rng):
         poses[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)

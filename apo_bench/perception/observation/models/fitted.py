@@ -53,10 +53,10 @@ class MeasuredNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class FittedNoise:
-    """Every goal is seen at `T exp(xi)`, xi of the error (x, y, along; rx, ry, about) that is drawn in its ray's frame.
+    """Every pose is observed at `T exp(xi)`, xi of an error (x, y, along; rx, ry, about) in the frame of its ray.
 
     Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
-    changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
+    changes which operations are outliers or missed, but at level 0 all is observed as shown. The covariance is that of
     inliers; an observation does not know which of its poses are outliers, only how often there are any.
     """
 
@@ -120,7 +120,7 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
 
 
 def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
-    """The tails of inliers, in the frames of the rays on which parts are seen."""
+    """The tails of inliers, in the frames of the rays on which parts are observed."""
     shift = measured.shift_mm
     turn = measured.turn_deg
     units = np.repeat(LEVEL_UNITS[[0, 3]] * noise_level, 2)
@@ -164,7 +164,7 @@ def observe_in_ray_frames(
 
     Args:
         errors: (n, 6), at level 1, in the frames of the rays: (x, y, along; rx, ry, about), [m, rad].
-        covariance: (6, 6), of inliers, alike.
+        covariance: (6, 6), of inliers.
         missed: (n,), what nothing is found for.
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)

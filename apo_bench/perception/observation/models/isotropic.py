@@ -22,7 +22,7 @@ _FARTHEST = 1e6
 @final
 @dataclass(frozen=True)
 class IsotropicNoise:
-    """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
+    """Every pose is observed at `T exp(xi)`, xi a Gaussian body twist of zero mean.
 
     Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
     exactly zero: the poses are then those that were shown, bit for bit.

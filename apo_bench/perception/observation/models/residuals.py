@@ -108,8 +108,8 @@ class Residuals:
 def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     """Match estimates to the truth and say how far off they are; those of images without truth do not count.
 
-    Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
-    least (the Hungarian method), however far off: what is gross is told afterwards by `INLIER_MM`. Scores do not count.
+    Per image and object, every part that was there gets its own estimate so that the distances add up to the
+    least (the Hungarian method), however far off: `INLIER_MM` marks what is gross afterwards. Scores do not count.
     Rotations are the nearest ones to the matrices as written.
     """
     from scipy.spatial.transform import Rotation
@@ -153,7 +153,7 @@ def _about_fixed_points(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which gross estimates only turn a part about a point that is fixed in it, and all shifts, of theirs that point.
 
-    A part that looks the same when turned about an axis beside its origin is seen with its origin far off, though it
+    A part that looks the same when turned about an axis off its origin is observed with its origin far off, though it
     stands where it is. Every symmetry keeps a point c, so the turned estimates of one object agree on it: (R - I) c + t
     is as small as the errors of those that are upright.
 

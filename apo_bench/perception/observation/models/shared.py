@@ -24,7 +24,7 @@ class BiasNoise:
     """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
 
     Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
-    operations for independent ones are told too much.
+    operations for independent ones assume too much.
     """
 
     noise_level: NoiseLevel
@@ -55,13 +55,13 @@ class BiasNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class ViewBiasNoise:
-    """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
+    """One displacement E of the world, drawn per trial, takes every part to where it is observed, but for a small part.
 
-    What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
+    Poses of parts relative to each other are nearly exact, those relative to the fixed parts are not. E turns about
     the middle of the operations' poses, where its size is the level; about the camera, a degree would be 16 mm.
     The twist by which an operation is wrong, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same
-    computed from shown poses and from seen ones. What is stated is about the middle of what was seen, so that nothing
-    of the truth is in it; seen from there, e has the same distribution.
+    computed from shown poses and from observed ones. What is stated is about the middle of the observed poses, so that
+    nothing of the truth is in it; seen from there, e has the same distribution.
     """
 
     noise_level: NoiseLevel
@@ -116,7 +116,7 @@ class CorrelatedNoise:
         unit, own = rng.standard_normal((2, len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]
-        # From the axes of the camera into those of the part: the turn by R^t as it is, the shift by R^t as it is seen.
+        # From the axes of the camera into those of the part: the turn by R^t, the shift by the observed R^t.
         in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
         xi = np.zeros((len(assembly), 6))
         xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], in_world[:, 1])

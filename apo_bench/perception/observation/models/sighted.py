@@ -28,14 +28,14 @@ IN_IMAGE = 0.5
 @final
 @dataclass(frozen=True)
 class AnisotropicNoise:
-    """Every goal is seen at `T exp(xi)`; turned into the world, xi is Gaussian with axes along and across the sight.
+    """Every pose is observed at `T exp(xi)`; in the world xi is Gaussian with axes along and across the sight.
 
     A camera finds depth less well than the place in the image, and a turn that tilts a part out of the image less
     well than one within it. The geometric means of the factors, 0.91 for positions and 1 for turns, keep a level
     comparable with that of `isotropic`; the root mean square of a position is 1.8 times as large.
 
-    The body covariance is R^t S R with S fixed in the world and R the rotation that was seen. That is exact: a turn
-    leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is seen.
+    The body covariance is R^t S R with S fixed in the world and R the rotation that was observed. That is exact: a turn
+    leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is observed.
     """
 
     noise_level: NoiseLevel
@@ -57,7 +57,7 @@ class AnisotropicNoise:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the frame that is seen, R_obs^t S1 e.
+        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the observed frame, R_obs^t S1 e.
         sight = line_of_sight()
         unit = rng.standard_normal((len(assembly), 6))
         place = self.noise_level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
