@@ -29,7 +29,7 @@ LARGE_MB = 50
 TIMES = 5  # runs of the import, of which the fastest counts
 INSTALLERS = ("pip", "setuptools")  # part of every environment
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
-OPTIONAL = ("build123d", "dm_env", "numba", "OCP", "pyarrow", "ray", "viser")
+OPTIONAL = ("build123d", "dm_env", "OCP", "pyarrow", "ray", "viser")
 """Packages of the extras; a module that needs one of these may be missing."""
 IMPORT = f"""
 import importlib, pkgutil, sys, apo_bench
