@@ -56,7 +56,6 @@ from apo_bench.records.robot_error import (
 )
 from apo_bench.records.secret_seed import (
     SecretSeed,
-    check_same_secret_seed,
     describe_secret_seed,
     find_common_secret_seed,
     open_secret_seed,
@@ -134,7 +133,6 @@ __all__ = (
     "affects",
     "check",
     "check_grip",
-    "check_same_secret_seed",
     "check_together",
     "convert_to_python_units",
     "describe_outcome",

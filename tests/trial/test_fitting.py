@@ -31,7 +31,7 @@ from apo_bench.trial.fitting import FittingPlan
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 
-plain = ContactCorrector(compiled=False)
+plain = ContactCorrector()
 SEVERAL_MM = 20.0
 """A cube that would be less than 20 mm deep in a castle need not be moved further than so: it has 15 mm of room."""
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly import build_contact_equations
-from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses
 from apo_bench.correction.solvers.posterior import compute_jacobian_rank
 from apo_bench.geometry import Array, pose
@@ -45,7 +45,7 @@ def correction(seen: Array, goals: Array, L: Array) -> Array:
 
 def jacobian(system: CompactEquations, found: NearestPoses) -> Array:
     """The derivative of e by z where the solver ended, (3 c, 6 n)."""
-    return np.asarray(system.gathered(system.blocks(found.poses, found.B)[1]).T)
+    return linearise_by(system, found.poses, found.B)[1].T
 
 
 def drift(J: Array, z: Array, directions: int) -> float:

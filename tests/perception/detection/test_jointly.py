@@ -48,7 +48,7 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
         estimated = estimate(seen, scene.assembly, seen.poses)
-        corrected = ContactCorrector(compiled=False)(seen)
+        corrected = ContactCorrector()(seen)
         assert (
             np.abs(build_contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
             < 5e-4
