@@ -115,8 +115,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `assumed_robot_error`: what a robot that probes assumes: `matched`, `unknown`, or standard deviations.
     - `max_reobservations`: how often `env.unwrapped.reobserve(operations)`, or a corrector, may observe operations
       again.
-    - `min_predicted_success`: a plan with a lower predicted success is not executed: reward 0, stage `promise`, code
-      `abstained`. 0 executes every plan.
+    - `min_predicted_success`: a plan with a lower predicted success is not executed: reward 0, stage
+      `predicted-success`, code `abstained`. 0 executes every plan.
     - `fidelity`: `full`, or `near-contact`, which simulates only where parts may touch, in a third of the time.
     - `render_mode`: `rgb_array` renders arm and parts before the step, and the end of the replay after it, without a
       display; `rgb_array_list` the frames of the replay; `human` opens a window when the replay begins.
@@ -202,13 +202,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._current("nothing was observed").observation
 
     @property
-    def reobserve(self) -> Reobservations | None:
-        """Observes operations of this episode again, `max_reobservations` times; None if that is 0.
+    def reobserve(self) -> Reobservations:
+        """Observes operations of this episode again, `max_reobservations` times.
 
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        return self._current("nothing was observed").reobserve if self._allowed else None
+        return self._current("nothing was observed").reobserve
 
     @property
     def trial(self) -> int:
@@ -244,7 +244,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         measured = source == DEPTH_CAMERA
         noise = range_sensor(self._scene, simulated, self._now.noise_level.mm) if measured else self._noise
         observation = observe_demonstration(simulated, noise, trial)
-        reobserve = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
+        reobserve = reobservations_of(simulated, noise, trial, self._allowed)
         self._episode = Episode(trial, replace(simulated, images=None), observation, reobserve)
         self.aim(observation.poses)
         self._refused = observation_failure(observation)

@@ -165,7 +165,7 @@ def measures(
         k, _, planned, _ = act
         operation = act.operation
         how = attach[k] if attach else None
-        deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.displaced_mm
+        deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.placed_part_shift_mm
         fit = _fit(act, how, clearance_mm, thresholds)
         yield fit
         yield Measure(k, "side", _side_mm(act), thresholds.support_mm)
@@ -178,7 +178,7 @@ def measures(
         for depth_m in depths_from_above(operation, planned, how, physical):
             yield Measure(k, "from_above", 1e3 * depth_m, _BESIDE_MM)
         for move in (move for move in arm if move.operation == k and not move.undo):
-            yield Measure(k, "gripper", move.struck_mm, thresholds.displaced_mm, move.struck)
+            yield Measure(k, "gripper", move.struck_mm, thresholds.placed_part_shift_mm, move.struck)
             yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 
 

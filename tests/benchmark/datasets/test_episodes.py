@@ -59,7 +59,7 @@ def test_frames_end_where_the_replay_did(made: Path) -> None:
     assert {frame["operation"] for frame in frames} - {None} == {1, 2}
     assert max(frame["force_n"] for frame in frames) > 0.1
     last = dict(zip(one["parts"], np.reshape(frames[-1]["part_poses"], (-1, 7)), strict=True))
-    planned = dict(zip(one["main_parts"], np.reshape(one["planned_goals"], (-1, 7)), strict=True))
+    planned = dict(zip(one["main_parts"], np.reshape(one["planned_poses"], (-1, 7)), strict=True))
     for part, at in planned.items():
         np.testing.assert_allclose(last[part][:3], at[:3], atol=1e-3)
     assert len(frames[0]["joints"]) == 6
@@ -80,7 +80,7 @@ def test_the_card_says_what_every_column_is(made: Path) -> None:
     for column, field in FRAMES.items():
         assert f"| `{column}` | " in card
         assert f"| {field.unit} | {field.frame} | {field.meaning} |" in card
-    assert "2 simulated trials, 2 of them right" in card
+    assert "2 simulated trials, 2 right" in card
     assert "Licence: Apache-2.0" in card
 
 
@@ -99,7 +99,7 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
     for each in read(tmp_path / "a" / "episodes.parquet"):
         frames = tmp_path / "a" / "frames" / f"{each['episode']:06}.parquet"
         assert frames.exists() == (each["frames"] > 0)
-        assert (each["planned_goals"] is not None) or not each["frames"]
+        assert (each["planned_poses"] is not None) or not each["frames"]
 
 
 @pytest.mark.parametrize(
@@ -135,6 +135,6 @@ def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monk
     monkeypatch.setattr(making, "replays", signalled)
     words = ["dataset", "make", "block_on_block", "--episodes", "3", "--format", form, "--out", str(tmp_path / "out")]
     assert main(words) == 128 + signal.SIGTERM
-    assert "1 simulated trials" in (tmp_path / "out" / "README.md").read_text()
+    assert "1 simulated trial," in (tmp_path / "out" / "README.md").read_text()
     assert not (tmp_path / "out" / "UNFINISHED").exists()
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
