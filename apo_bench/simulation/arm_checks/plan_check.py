@@ -1,4 +1,4 @@
-"""Predict what an arm makes of a plan: reach, room to the limits of joints, room of the gripper, tip error."""
+"""Predict what an arm makes of a plan."""
 
 from collections.abc import Iterable, Sequence
 from typing import Literal, cast

@@ -158,7 +158,7 @@ class Kinematics:
             more = self._posture.compute_qp_objective(self.configuration)
             H = H + more[0]
             c = c - more[1]
-        step: Array = np.linalg.solve(H, c)
+        step: Any = np.linalg.solve(H, c)
         low, high = self.GAIN * (self._range - self.configuration.data.qpos)
         if (step >= low).all() and (step <= high).all():
             return step

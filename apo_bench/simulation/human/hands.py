@@ -1,4 +1,4 @@
-"""Human hands: mocap bodies that hold parts by soft welds and move them along straight lines."""
+"""Human hands, mocap bodies that hold parts by soft welds."""
 
 from collections.abc import Callable
 from copy import copy

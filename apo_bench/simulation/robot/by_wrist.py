@@ -73,7 +73,7 @@ def read_wrist(robot: Robot, wrist: WristSensor) -> Iterator[None]:
         robot.wrist, robot.fidelity = before
 
 
-def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
+def zero(robot: Robot, wrist: WristSensor) -> None:
     """Stand still in free air; what the sensor shows on average, but for the known weights, is nothing from now on.
 
     Raises:
@@ -82,7 +82,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
     with read_wrist(robot, wrist):
         robot.stand()
         wrist.start_zero()
-        robot.wait(seconds)
+        robot.wait(ZERO_S)
         wrist.end_zero()
 
 

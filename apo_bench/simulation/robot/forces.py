@@ -1,4 +1,4 @@
-"""The contact forces that a robot reads: on what is in its hand, behind a filter, and on the arm."""
+"""The contact forces that a robot reads."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The arm between two actions: the tip moves by the action, gives way to force, and stops where it struck.
+"""Control the tip of the arm between two actions of an agent.
 
 The robot knows what it commands, its encoders, its opening, the force on the part in its hand and the wrench at its
 wrist; nothing here reads where a part is.
