@@ -5,6 +5,7 @@ dovetail that lies on a receded floor has more room between its leaning walls. W
 it, so the largest gap is that of a linear program.
 """
 
+from collections.abc import Iterator
 from functools import lru_cache
 from math import cos, pi
 from typing import NamedTuple
@@ -14,7 +15,7 @@ import numpy as np
 from apo_bench.assembly.contact_kinds import contact_kind, play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose
+from apo_bench.geometry import Array, Face, Laid, Overlap, RoundFace, across_axis, mate, overlaps, pose
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
@@ -22,6 +23,8 @@ _LEVER_MM = 30.0
 """Turns count as the way at this distance, so that all unknowns of the linear program are of one size."""
 _DIGITS = 6
 """Of a play in mm; what a program leaves behind them is rounding."""
+_ALONG = 1e-9
+"""Opening by a motion of size 1, in the units of the rows, that counts as none."""
 _ROUND_M = 9
 """Digits of a pose [m] that distinguish two layouts apart."""
 
@@ -106,7 +109,9 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, 
     if contact_kind(*faces[which]) == "shaft in hole":
         return None
     T = np.frombuffer(at).reshape(4, 4)
-    touches = [_touch(*pair, T, clearance_mm) for pair in faces]
+    # Flat faces are measured in one call.
+    flat = iter(overlaps([Laid(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]))
+    touches = [_touch(a, b, T, clearance_mm, flat) for a, b in faces]
     # A small motion moves point p by v + w x p, of which n . (v + w x p) = n . v + (p x n) . w opens the contact.
     rows = np.concatenate([_rows(touch) for touch in touches])
     limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
@@ -123,12 +128,20 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
     """The most that a motion opens by one of its own rows, (k, 6), if no row closes by more than its limit; infinite
     if one has no bound.
 
-    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves.
+    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves; none
+    where a shift along a normal is without bound, or opens as much as rows that are opposite allow at most.
     """
     from scipy.optimize import linprog
 
     if not len(own):
         return np.inf
+    # A shift along a normal goes on until the first row is at its limit.
+    rates = -rows[:, :3] @ own[:, :3].T
+    shift = np.where(rates > _ALONG, limits[:, None] / np.maximum(rates, _ALONG), np.inf).min(axis=0).max()
+    # No motion opens an own row by more than the limit of a row that is its opposite.
+    faced = (np.abs(rows[:, None] + own) < _ALONG).all(axis=2)
+    if shift >= np.where(faced, limits[:, None], np.inf).min(axis=0).max():
+        return float(shift)
     # maximise sum_k own_k x_k, with one motion x_k per own row, so that -rows x_k <= limits for each k: the programs
     # have nothing in common, so the matrix of all constraints is block diagonal.
     together = np.kron(np.eye(len(own)), -rows)
@@ -136,15 +149,16 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
     return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
 
 
-def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _Touch:
+def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, flat: Iterator[Overlap]) -> _Touch:
     """Where two faces touch.
 
     Args:
         T: The pose of the part that moves in the frame of the one that rests.
+        flat: Gives the overlap, if both are flat.
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):
-        points = overlap(moved, T, rests, np.eye(4)).corners
+        points = next(flat).corners
         return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
     between = mate(moved, T, rests, np.eye(4))
     if isinstance(rests, Face):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.contact_kinds import contact_kind
+from apo_bench.assembly.meeting import common_overlaps
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
@@ -19,7 +20,6 @@ from apo_bench.geometry import (
     Face,
     RoundFace,
     across_axis,
-    overlap,
     pose,
 )
 
@@ -55,14 +55,12 @@ def touched_contacts(
 def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
     at each, (k, 3)."""
-    points = [np.zeros((0, 3))]
-    normals = [np.zeros((0, 3))]
-    for (m, e), _, n, at in touched:
-        if at is None:
-            at = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
-        points.append(at)
-        normals.append(np.tile(n, (len(at), 1)))
-    return np.concatenate(points), np.concatenate(normals)
+    every = list(touched)
+    flat = iter(common_overlaps(assembly, ((each.contact, poses) for each in every if each.points is None)))
+    points = [next(flat).corners if each.points is None else each.points for each in every]
+    normals = [np.tile(each.normal, (len(at), 1)) for each, at in zip(every, points, strict=True)]
+    nothing = np.zeros((0, 3))
+    return np.concatenate([nothing, *points]), np.concatenate([nothing, *normals])
 
 
 def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:

@@ -3,7 +3,18 @@
 from apo_bench.geometry.arrays import Array, Ints, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces, recede_pieces
 from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
-from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
+from apo_bench.geometry.covering import (
+    Laid,
+    Overlap,
+    beside,
+    face_area,
+    overlap,
+    overlap_area,
+    overlaps,
+    own_shape,
+    plane_frame,
+    shares,
+)
 from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
@@ -53,6 +64,7 @@ __all__ = (
     "Flips",
     "Hull",
     "Ints",
+    "Laid",
     "Mate",
     "Overlap",
     "PadPlace",
@@ -96,6 +108,7 @@ __all__ = (
     "nearest_symmetric_pose",
     "overlap",
     "overlap_area",
+    "overlaps",
     "own_shape",
     "passage",
     "physical_pieces",
@@ -111,6 +124,7 @@ __all__ = (
     "rings_of",
     "separating_axes",
     "shadow",
+    "shares",
     "sides_of",
     "straighten",
     "symmetries",

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.assembly import Assembly, Reached, Snapshot, placements
-from apo_bench.geometry import Array, Overlap, pose
-from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict
+from apo_bench.geometry import Array, pose
+from apo_bench.judging.contacts import ContactCase, ContactJudge, ContactMoment, ContactVerdict
 from apo_bench.judging.displaced import displacements
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
@@ -53,13 +53,13 @@ def _contacts_when_made(
         return ()
     # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
     true = placements(judge.assembly, first.poses, reference)
-    out = []
+    cases = []
     for contact, made, lost in judge.assembly.relations():
         moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                out.append(judge.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
-    return tuple(out)
+                cases.append(ContactCase(contact, made, moment, snapshot.poses, true[made]))
+    return judge.verdicts(cases)
 
 
 def _pushes(

@@ -28,12 +28,13 @@ from apo_bench.assembly import (
     apart_limit_mm,
     contact_kind,
     deep_limit_mm,
+    meet,
     placements,
 )
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, Mate
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.interference import depths_from_above, depths_on_way, physical_solids
-from apo_bench.planning.prediction.resting import between, enters, is_support, residual, resting_poses
+from apo_bench.planning.prediction.resting import enters, is_support, residual, residuals, resting_poses
 from apo_bench.planning.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
 
@@ -69,6 +70,8 @@ _ACROSS = 0.5
 """A face whose normal makes a smaller cosine with the way in is a wall along it."""
 _BESIDE_MM = 1e-3
 """Parts that are less deep in each other only touch, whatever was rounded."""
+_ROUNDING_MM = 1e-9
+"""Lengths that differ by less are the same."""
 _CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
 _SAID: Mapping[MeasureKind, tuple[MeasureCode, str]] = MappingProxyType(
     {
@@ -208,15 +211,26 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
     """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
     lengths = clearance_mm, thresholds.fit_margin_mm, thresholds.support_mm
     sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
-    for contact in act.operation.contacts:
-        if enters(act.alone, contact):
-            deep_m, apart_m = _misfits_m(act, contact, how)
-            limit = deep_limit_mm(act.alone, contact, *lengths)
-            sides.append((1e3 * deep_m, limit))
-            if 1e3 * apart_m > limit:
-                limit = apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
-            sides.append((1e3 * apart_m, limit))
-    return Measure(act.number, "fit", *max(sides, key=lambda side: side[0] - side[1]))
+    apart = list[tuple[float, float, Contact]]()
+    entering = [contact for contact in act.operation.contacts if enters(act.alone, contact)]
+    for contact, (deep_m, apart_m) in zip(entering, _misfits_m(act, entering, how), strict=True):
+        limit = deep_limit_mm(act.alone, contact, *lengths)
+        sides.append((1e3 * deep_m, limit))
+        apart.append((1e3 * apart_m, limit, contact))
+    worst = max(sides, key=_excess)
+    # Faces may be at least as far apart as deep; how much farther, a linear program says, and only where it may matter.
+    for size, limit, contact in apart:
+        if size > limit:
+            if size - limit <= _excess(worst) + _ROUNDING_MM:
+                continue
+            limit = apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
+        worst = max(worst, (size, limit), key=_excess)
+    return Measure(act.number, "fit", *worst)
+
+
+def _excess(side: tuple[float, float]) -> float:
+    """By how much a length is more than what is allowed."""
+    return side[0] - side[1]
 
 
 def _tip(
@@ -233,30 +247,33 @@ def _tip(
     yield Measure(act.number, "tip", off.size + move.beside_mm, off.allowed)
 
 
-def _misfits_m(act: _Act, contact: Contact, how: Attach | None) -> tuple[float, float]:
-    """How deep and how far apart a contact is across the way in at most; of round faces, twice, how far apart the axes
+def _misfits_m(act: _Act, contacts: Sequence[Contact], how: Attach | None) -> list[tuple[float, float]]:
+    """How deep and how far apart contacts are across the way in at most; of round faces, twice, how far apart the axes
     are, across it.
     """
     way = None if how is None else act.planned[act.operation.main][:3, :3] @ how.direction
-    if contact_kind(*map(act.alone.face_of, contact)) not in ("plane on plane", "shaft on plane"):
-        lie = between(act.alone, contact, act.planned)
-        if way is None:
-            return lie.gap_m, lie.gap_m
-        # Along the way the robot goes on until it feels contact, so only the part of each offset across it counts.
-        beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
-        off = beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
-        return off, off
-    e, n = residual(act.alone, contact, act.planned)
-    if way is not None and abs(n @ way) >= _ACROSS:
-        return 0.0, 0.0
-    return max(0.0, -float(e.min())), max(0.0, float(e.max()))
+    out = []
+    for contact, lie in zip(contacts, meet(act.alone, ((c, act.planned) for c in contacts)), strict=True):
+        if contact_kind(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
+            e, n = residual(act.alone, contact, lie, act.planned)
+            along = way is not None and abs(n @ way) >= _ACROSS
+            out.append((0.0, 0.0) if along else (max(0.0, -float(e.min())), max(0.0, float(e.max()))))
+        else:
+            assert isinstance(lie, Mate)
+            out.append((_off_axis_m(lie, way),) * 2)
+    return out
+
+
+def _off_axis_m(lie: Mate, way: Array | None) -> float:
+    """How far apart the axes of two round faces are, or their walls, across the way in."""
+    if way is None:
+        return lie.gap_m
+    # Along the way the robot goes on until it feels contact, so only the part of each offset across it counts.
+    beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
+    return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
 
 
 def _side_mm(act: _Act) -> float:
     """Largest |e| of the sides that the operation slides onto others, once its part rests."""
-    sides = [
-        1e3 * float(np.abs(residual(act.alone, contact, act.rests)[0]).max())
-        for contact in act.operation.contacts
-        if not enters(act.alone, contact) and not is_support(act.alone, contact, act.rests)
-    ]
-    return max(sides, default=0.0)
+    sides = [c for c in act.operation.contacts if not enters(act.alone, c) and not is_support(act.alone, c, act.rests)]
+    return max((1e3 * float(np.abs(e).max()) for e, _ in residuals(act.alone, sides, act.rests)), default=0.0)

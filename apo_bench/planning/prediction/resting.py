@@ -4,20 +4,13 @@ Weight lays a part flat on what carries it. A part that is slid against another 
 touches and keeps its turn. Faces that fit into one another are left as they are planned, shafts in holes and cones too.
 """
 
+from collections.abc import Sequence
 from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses
-from apo_bench.geometry import (
-    Array,
-    Face,
-    Mate,
-    RoundFace,
-    mate,
-    overlap,
-    pose,
-)
+from apo_bench.assembly import Assembly, Contact, Operation, Poses, measure_mate, meet
+from apo_bench.geometry import Array, Face, Mate, Overlap, RoundFace, pose
 
 _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
@@ -37,7 +30,7 @@ def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Pos
     for contact in supports * (_ROUNDS if any(map(assembly.is_round, supports)) else 1):
         _displace(now, operation, _flat(assembly, contact, now))
     for contact in (contact for contact in touched if contact not in supports):
-        e, n = residual(assembly, contact, now)
+        e, n = residuals(assembly, [contact], now)[0]
         _displace(now, operation, _shift(n * e.min()))
     return MappingProxyType(now)
 
@@ -48,29 +41,25 @@ def enters(assembly: Assembly, contact: Contact) -> bool:
     return assembly.is_fit(contact) or not on_plane
 
 
-def between(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
-    """How the faces of a contact of round ones lie to each other."""
-    m, e = contact
-    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
-
-
-def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, Array]:
-    """e at the corners of the overlap, (k,), [m], positive where the faces are apart, and the normal, (3,), world.
+def residuals(assembly: Assembly, contacts: Sequence[Contact], poses: Poses) -> list[tuple[Array, Array]]:
+    """e of each contact at the corners of its overlap, (k,), [m], positive where the faces are apart, and the normal.
 
     Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
-    shaft on a plane the ends of the line of contact.
+    shaft on a plane the ends of the line of contact. The normal, (3,), is that of the flat face, world.
     """
+    lies = meet(assembly, ((contact, poses) for contact in contacts))
+    return [residual(assembly, *pair, poses) for pair in zip(contacts, lies, strict=True)]
+
+
+def residual(assembly: Assembly, contact: Contact, lie: Mate | Overlap, poses: Poses) -> tuple[Array, Array]:
+    """`residuals` of one contact whose faces lie so to each other."""
     m, e = contact
-    T_m = poses[m.part]
-    T_e = poses[e.part]
-    if assembly.is_round(contact):
+    if isinstance(lie, Mate):
         up = _up(assembly, contact, poses)
-        return between(assembly, contact, poses).off @ up, up * (
-            -1.0 if m.face in assembly.solids[m.part].rounds else 1.0
-        )
+        return lie.off @ up, up * (-1.0 if m.face in assembly.solids[m.part].rounds else 1.0)
+    T_m = poses[m.part]
     plane = assembly.face(m).plane
-    common = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
-    corners = common.corners if common and len(common.corners) else pose.apply(T_e, assembly.face(e).outline)
+    corners = lie.corners if len(lie.corners) else pose.apply(poses[e.part], assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
     return (corners - T_m[:3, 3]) @ n + plane[3], n
 
@@ -104,7 +93,7 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
-    touch = between(assembly, contact, poses)
+    touch = measure_mate(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
     off = touch.off.mean(axis=0)

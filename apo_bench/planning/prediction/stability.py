@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses, placements
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, all_boxes, mate, overlap, pose
+from apo_bench.assembly import Assembly, Contact, Operation, Poses, common_overlaps, meet, placements
+from apo_bench.geometry import Array, Face, Mate, Overlap, RoundFace, across_axis, all_boxes, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
@@ -77,7 +77,8 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
     from scipy.optimize import nnls
 
-    pushing = [pushes(assembly, contact, poses) for contact in operation.contacts]
+    lies = meet(assembly, ((contact, poses) for contact in operation.contacts))
+    pushing = [pushes(assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
         return 0.0
@@ -97,17 +98,12 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
 
     And the same of each contact that could carry weight, also of one that covers nothing.
     """
-    points = [np.zeros((0, 3))]
-    signs = [np.zeros(0)]
-    ups = list[float]()
-    for m, e in operation.contacts:
-        up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
-        if abs(up) >= _LEVEL:
-            corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
-            ups.append(float(np.sign(up)))
-            points.append(corners)
-            signs.append(np.full(len(corners), ups[-1]))
-    return np.concatenate(points), np.concatenate(signs), ups
+    heights = [float((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) for _, e in operation.contacts]
+    level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]
+    common = common_overlaps(assembly, ((contact, poses) for contact, _ in level))
+    ups = [float(np.sign(up)) for _, up in level]
+    points = np.concatenate([np.zeros((0, 3)), *(each.corners for each in common)])
+    return points, np.repeat(ups, [len(each.corners) for each in common]), ups
 
 
 def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
@@ -152,26 +148,30 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     return np.concatenate([points, *[held] * 4]), np.concatenate([n, *(m + side for side in sides)])
 
 
-def pushes(assembly: Assembly, contact: Contact, poses: Poses) -> Pushes:
-    """What the second part of a contact, which rests, can push the first one with."""
+def pushes(assembly: Assembly, contact: Contact, lie: Mate | Overlap, poses: Poses) -> Pushes:
+    """What the second part of a contact, which rests, can push the first one with.
+
+    Args:
+        lie: How the faces lie to each other, from `meet`.
+    """
     m, e = contact
     nothing = np.zeros((0, 3))
     moved = assembly.face_of(m)
     rests = assembly.face_of(e)
     T = poses[m.part]
     T_rests = poses[e.part]
-    if isinstance(moved, Face) and isinstance(rests, Face):
+    if isinstance(lie, Overlap):
+        assert isinstance(rests, Face)
         n = (T_rests[:3, :3] @ rests.normal)[None]
-        points = overlap(moved, T, rests, T_rests).corners
-        return Pushes(points, np.repeat(n, len(points), axis=0), n)
-    between = mate(moved, T, rests, T_rests)
-    at = between.points if between.common else nothing
+        return Pushes(lie.corners, np.repeat(n, len(lie.corners), axis=0), n)
+    at = lie.points if lie.common else nothing
     if isinstance(rests, Face):
         assert isinstance(moved, RoundFace)
         return _along(T_rests[:3, :3] @ rests.normal, at, -moved.radius)
     if isinstance(moved, Face):
         return _along(-T[:3, :3] @ moved.normal, at, rests.radius)
-    around, forces = _around(rests, between.axis, between.sine)
+    assert isinstance(moved, RoundFace)
+    around, forces = _around(rests, lie.axis, lie.sine)
     return Pushes(
         (at[:, None] + _radii(moved, T, rests, T_rests, at)[:, None, None] * around).reshape(-1, 3),
         np.tile(forces, (len(at), 1)),
