@@ -17,7 +17,7 @@ from apo_bench.assembly.facing import face_gap, faces_oppose, height
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
-from apo_bench.assembly.meeting import common_overlaps, measure_mate, meet
+from apo_bench.assembly.meeting import Lie, Meetings, measure_mate
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.outlier_model import OutlierModel, measured_rates
 from apo_bench.assembly.pattern import Pattern, contact_pattern, faces_away
@@ -64,6 +64,8 @@ __all__ = (
     "InHand",
     "Iterate",
     "Layout",
+    "Lie",
+    "Meetings",
     "Node",
     "Observation",
     "Operation",
@@ -89,7 +91,6 @@ __all__ = (
     "Try",
     "apart_limit_mm",
     "arc_residuals",
-    "common_overlaps",
     "contact_equations",
     "contact_kind",
     "contact_pattern",
@@ -109,7 +110,6 @@ __all__ = (
     "measure_mate",
     "measure_round",
     "measured_rates",
-    "meet",
     "mouth",
     "observed_residuals",
     "outline_points",

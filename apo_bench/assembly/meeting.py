@@ -1,34 +1,49 @@
 """How the faces of contacts lie to each other where parts are: overlaps of flat ones, mates of round ones."""
 
 from collections.abc import Iterable
+from typing import final
 
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import Laid, Mate, Overlap, mate, overlaps
 
-
-def meet(assembly: Assembly, contacts: Iterable[tuple[Contact, Poses]]) -> list[Mate | Overlap]:
-    """Measure contacts, each where its parts are; flat ones all in one call.
-
-    Args:
-        contacts: Each with the poses of the parts, world frame, [m].
-
-    Returns:
-        For each the overlap of two flat faces, or how a round one lies to the other.
-    """
-    pairs = list(contacts)
-    laid = [
-        Laid(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
-        for (m, e), poses in pairs
-        if not assembly.is_round(Contact(m, e))
-    ]
-    flat = iter(overlaps(laid))
-    return [measure_mate(assembly, *pair) if assembly.is_round(pair[0]) else next(flat) for pair in pairs]
+Lie = Mate | Overlap
+"""How two faces lie to each other of which one is round, or the overlap of two flat ones."""
 
 
-def common_overlaps(assembly: Assembly, contacts: Iterable[tuple[Contact, Poses]]) -> list[Overlap]:
-    """What the faces of contacts have in common, as in `meet`; nothing, if they do not look at each other."""
-    return [each.common if isinstance(each, Mate) else each for each in meet(assembly, contacts)]
+@final
+class Meetings:
+    """The contacts of an assembly, measured where parts are; each contact once at the same poses."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self._found = dict[tuple[Contact, bytes, bytes], Lie]()
+
+    def lies(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Lie]:
+        """Measure contacts; flat ones all in one call.
+
+        Args:
+            contacts: Each with the poses of the parts, world frame, [m].
+
+        Returns:
+            For each how its faces lie to each other.
+        """
+        pairs = list(contacts)
+        keys = [(c, poses[c[0].part].tobytes(), poses[c[1].part].tobytes()) for c, poses in pairs]
+        fresh = {key: pair for key, pair in zip(keys, pairs, strict=True) if key not in self._found}
+        flat = {key: pair for key, pair in fresh.items() if not self.assembly.is_round(pair[0])}
+        if flat:
+            self._found.update(zip(flat, overlaps([self._laid(*pair) for pair in flat.values()]), strict=True))
+        self._found.update({key: measure_mate(self.assembly, *fresh[key]) for key in fresh.keys() - flat.keys()})
+        return [self._found[key] for key in keys]
+
+    def overlaps(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Overlap]:
+        """What the faces of contacts have in common, as in `lies`; nothing, if they do not look at each other."""
+        return [lie.common if isinstance(lie, Mate) else lie for lie in self.lies(contacts)]
+
+    def _laid(self, contact: Contact, poses: Poses) -> Laid:
+        m, e = contact
+        return Laid(self.assembly.face(m), poses[m.part], self.assembly.face(e), poses[e.part])
 
 
 def measure_mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:

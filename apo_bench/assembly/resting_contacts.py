@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.contact_kinds import contact_kind
-from apo_bench.assembly.meeting import common_overlaps
+from apo_bench.assembly.meeting import Meetings
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
@@ -52,11 +52,17 @@ def touched_contacts(
     return touches
 
 
-def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
+def corners(
+    assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: Meetings | None = None
+) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
-    at each, (k, 3)."""
+    at each, (k, 3).
+
+    Args:
+        known: What is measured already.
+    """
     every = list(touched)
-    flat = iter(common_overlaps(assembly, ((each.contact, poses) for each in every if each.points is None)))
+    flat = iter((known or Meetings(assembly)).overlaps((each.contact, poses) for each in every if each.points is None))
     points = [next(flat).corners if each.points is None else each.points for each in every]
     normals = [np.tile(each.normal, (len(at), 1)) for each, at in zip(every, points, strict=True)]
     nothing = np.zeros((0, 3))

@@ -9,11 +9,12 @@ from apo_bench.assembly import (
     Assembly,
     Contact,
     ContactKind,
+    Lie,
+    Meetings,
     Poses,
     apart_limit_mm,
     contact_kind,
     deep_limit_mm,
-    meet,
 )
 from apo_bench.geometry import Array, Mate, Overlap, shares
 from apo_bench.records import Thresholds
@@ -83,21 +84,22 @@ class ContactCase(NamedTuple):
 class ContactJudge(NamedTuple):
     """The limits of a contact, at any moment."""
 
-    assembly: Assembly
+    known: Meetings
+    """The contacts, with what is measured already."""
     thresholds: Thresholds
     clearance_mm: float
 
     def verdicts(self, cases: Sequence[ContactCase]) -> tuple[ContactVerdict, ...]:
         """Measure contacts, all in one call."""
-        found = meet(self.assembly, ((c.contact, poses) for c in cases for poses in (c.poses, c.true)))
+        found = self.known.lies((c.contact, poses) for c in cases for poses in (c.poses, c.true))
         common = [each.common if isinstance(each, Mate) else each for each in found]
         shares = covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
         return tuple(self._verdict(*each) for each in zip(cases, found[::2], shares.tolist(), strict=True))
 
-    def _verdict(self, case: ContactCase, lie: Mate | Overlap, covered: float) -> ContactVerdict:
+    def _verdict(self, case: ContactCase, lie: Lie, covered: float) -> ContactVerdict:
         limits = self.thresholds
         contact = case.contact
-        gaps, angle = _measure(self.assembly, contact, case.poses, lie)
+        gaps, angle = _measure(self.known.assembly, contact, case.poses, lie)
         allowed, gap = self._nearest_limit(case, gaps)
         covering = gap is not None and covered >= limits.overlap_fraction
         near = angle <= limits.loose_angle_deg and (gap is None or gap <= limits.loose_gap_mm)
@@ -112,17 +114,17 @@ class ContactJudge(NamedTuple):
             covering=covering,
             loose=near and covering,
             allowed_mm=allowed,
-            kind=contact_kind(*map(self.assembly.face_of, contact)) or "plane on plane",
+            kind=contact_kind(*map(self.known.assembly.face_of, contact)) or "plane on plane",
         )
 
     def _nearest_limit(self, case: ContactCase, gaps: Gaps | None) -> tuple[float, float | None]:
         """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
-        deep = deep_limit_mm(self.assembly, case.contact, *lengths)
+        deep = deep_limit_mm(self.known.assembly, case.contact, *lengths)
         # faces may be farther apart than deep, so the smaller gap of the two needs no other limit
         if gaps is None or gaps.apart_mm <= gaps.deep_mm:
             return deep, None if gaps is None else gaps.deep_mm
-        apart = apart_limit_mm(self.assembly, case.contact, case.operation, case.true, *lengths)
+        apart = apart_limit_mm(self.known.assembly, case.contact, case.operation, case.true, *lengths)
         return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
 
 
@@ -163,7 +165,7 @@ def _when(verdict: ContactVerdict) -> str:
     return f" after operation {verdict.operation + 1}" if verdict.moment == "made" else ""
 
 
-def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Mate | Overlap) -> tuple[Gaps | None, float]:
+def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Lie) -> tuple[Gaps | None, float]:
     """What is between the faces, and the angle between the normals or axes [degrees].
 
     Round faces are off, not apart or deep.

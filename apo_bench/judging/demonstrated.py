@@ -10,12 +10,9 @@ from apo_bench.judging.contacts import ContactCase, ContactJudge, ContactMoment,
 from apo_bench.judging.displaced import displacements
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
-from apo_bench.records import Thresholds
 
 
-def judge_demonstrated(
-    assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
-) -> Judgement:
+def judge_demonstrated(judge: ContactJudge, reached: Reached, reference: Array) -> Judgement:
     """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
 
     At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
@@ -28,15 +25,15 @@ def judge_demonstrated(
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
     """
+    assembly = judge.known.assembly
     after = reached.after
     final = reached.final
-    judge = ContactJudge(assembly, thresholds, clearance_mm)
     states = [snapshot for snapshot in (*after, final) if snapshot is not None]
     return judgement(
         _contacts_when_made(judge, after, final, reference),
         states,
         [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *_corners_at_end(assembly, reached))],
-        thresholds,
+        judge.thresholds,
         all_made=len(states) == len(after) + 1,
     )
 
@@ -52,9 +49,9 @@ def _contacts_when_made(
     if first is None:
         return ()
     # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
-    true = placements(judge.assembly, first.poses, reference)
+    true = placements(judge.known.assembly, first.poses, reference)
     cases = []
-    for contact, made, lost in judge.assembly.relations():
+    for contact, made, lost in judge.known.assembly.relations():
         moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:

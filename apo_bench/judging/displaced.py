@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, Snapshot, corners, touched_contacts
+from apo_bench.assembly import Assembly, Contact, Meetings, Poses, Snapshot, corners, touched_contacts
 from apo_bench.geometry import Array, Solid, pose, turn_alike
 
 _ONE_WAY = 0.999
@@ -42,7 +42,7 @@ def displacements(
 
 
 def faults_of_place(
-    assembly: Assembly, after: _After, final: Snapshot, away: Collection[str], seen: Poses
+    known: Meetings, after: _After, final: Snapshot, away: Collection[str], seen: Poses
 ) -> Iterator[tuple[str, float]]:
     """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
 
@@ -52,9 +52,11 @@ def faults_of_place(
     these, as they say where it belongs. A whole on a plain support may stand anywhere.
 
     Args:
+        known: The contacts, with what is measured already.
         away: Parts that do not count.
         seen: The final poses, each part turned by the symmetry by which its contacts are judged.
     """
+    assembly = known.assembly
     last = last_moves(assembly)
     room = dict(displacements(assembly, after, final, away))
     for parts, contacts in _standing(assembly, away).items():
@@ -65,7 +67,7 @@ def faults_of_place(
             continue
         put = after[max(last.get(a, 0), last.get(b, 0))]
         if put is not None:
-            held = _held(assembly, contacts, (a, b), final.poses[a], seen)
+            held = _held(known, contacts, (a, b), final.poses[a], seen)
             slid = _slid(assembly, (a, b), put.poses, final.poses, held)
             yield f"{b} against {a}", min(slid, max(room.get(a, 0.0), room.get(b, 0.0)))
 
@@ -109,13 +111,13 @@ def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
     return now
 
 
-def _held(assembly: Assembly, contacts: Sequence[Contact], parts: tuple[str, str], T: Array, seen: Poses) -> Array:
+def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], T: Array, seen: Poses) -> Array:
     """By how much twists (v, w) of the second part open contacts with the first one: rows of n (v + w x p), (k, 6).
 
     Args:
         T: The pose of the first part, in whose frame the twists are.
     """
-    points, normals = corners(assembly, touched_contacts(assembly, contacts, [parts[1]], seen), seen)
+    points, normals = corners(known.assembly, touched_contacts(known.assembly, contacts, [parts[1]], seen), seen, known)
     p = pose.apply(pose.inverse(T), points)
     n = normals @ T[:3, :3]
     return np.concatenate([n, np.cross(p, n)], axis=1)

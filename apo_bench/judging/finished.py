@@ -4,17 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, common_overlaps, placements
+from apo_bench.assembly import Assembly, Contact, Meetings, Poses, Reached, Relation, placements
 from apo_bench.geometry import Array, nearest_alike
 from apo_bench.judging.contacts import ContactCase, ContactJudge, covered_shares
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
-from apo_bench.records import Thresholds
 
 
-def judge_finished(
-    assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
-) -> Judgement:
+def judge_finished(judge: ContactJudge, reached: Reached, reference: Array) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
     The contacts that stand at the end are needed. A part may have been put in by any of its symmetries: the one
@@ -28,19 +25,19 @@ def judge_finished(
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
     """
+    assembly = judge.known.assembly
     final = reached.final
     all_made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
     if final is None:
-        return judgement((), (), (), thresholds, all_made=False)
-    judge = ContactJudge(assembly, thresholds, clearance_mm)
+        return judgement((), (), (), judge.thresholds, all_made=False)
     away = fixtures(assembly)
     true = placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
     return judgement(
         judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],
-        [(what, 1e3 * m) for what, m in faults_of_place(assembly, reached.after, final, away, seen)],
-        thresholds,
+        [(what, 1e3 * m) for what, m in faults_of_place(judge.known, reached.after, final, away, seen)],
+        judge.thresholds,
         all_made=all_made,
         disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
     )
@@ -88,8 +85,7 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
     true = placements(assembly, final, references.swapaxes(0, 1))[-1]
     seen = _as_meant(assembly, final, true)
     count = len(references)
-    common = common_overlaps(
-        assembly,
+    common = Meetings(assembly).overlaps(
         ((c, at) for each in (seen, true) for at in _one_by_one(each, count) for c, _ in contacts),
     )
     reached, expected = common[: len(common) // 2], common[len(common) // 2 :]

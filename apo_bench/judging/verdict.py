@@ -6,8 +6,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Reached, Snapshot
+from apo_bench.assembly import Assembly, Meetings, Reached, Snapshot
 from apo_bench.geometry import Array, frozen
+from apo_bench.judging.contacts import ContactJudge
 from apo_bench.judging.demonstrated import judge_demonstrated
 from apo_bench.judging.finished import judge_finished
 from apo_bench.judging.judgement import Judgement
@@ -60,10 +61,11 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
     """
     reference = frozen(reference, len(assembly), 4, 4)
     sound = Reached(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
+    contacts = ContactJudge(Meetings(assembly), criteria.thresholds, criteria.clearance_mm)
     return Verdict(
         criteria.success_means,
-        finished=judge_finished(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),
-        demonstrated=judge_demonstrated(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),
+        finished=judge_finished(contacts, sound, reference),
+        demonstrated=judge_demonstrated(contacts, sound, reference),
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Poses, arc_residuals, common_overlaps, placements, relation_graph
+from apo_bench.assembly import Meetings, Observation, Poses, arc_residuals, placements, relation_graph
 from apo_bench.geometry import Array
 from apo_bench.io import default_looks, save_figure
 from apo_bench.scenario import Scenario
@@ -46,7 +46,7 @@ def poses_panel(title: str, observation: Observation, poses: Array, step: int, w
         if e > observation.gap_m:
             wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
     for arc in graph.arcs:
-        common = common_overlaps(assembly, ((contact, placed) for contact in arc.contacts))
+        common = Meetings(assembly).overlaps((contact, placed) for contact in arc.contacts)
         if arc.lost is None and not all(common):
             wrong.append(f"{arc}: no overlap")
     return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)

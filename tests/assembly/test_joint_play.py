@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import Contact, Poses, contact_kind, joint_play_mm, placements
+from apo_bench.assembly import Contact, Meetings, Poses, contact_kind, joint_play_mm, placements
 from apo_bench.geometry import intrusion_depths, pose
 from apo_bench.judging.contacts import ContactCase, ContactJudge
 from apo_bench.planning.prediction.interference import physical_solids
@@ -111,7 +111,7 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
 
 def touching(scenario: Scenario, pair: Pair, poses: Poses) -> dict[Contact, bool]:
     contacts, made, true = pair
-    judge = ContactJudge(scenario.assembly, Thresholds(), scenario.clearance_mm)
+    judge = ContactJudge(Meetings(scenario.assembly), Thresholds(), scenario.clearance_mm)
     verdicts = judge.verdicts([ContactCase(c, made, "made", poses, true) for c in contacts])
     return {verdict.contact: verdict.touching for verdict in verdicts}
 

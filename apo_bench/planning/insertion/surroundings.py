@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, common_overlaps, mouth, outline_points, touched_contacts
+from apo_bench.assembly import Assembly, Contact, Meetings, Poses, mouth, outline_points, touched_contacts
 from apo_bench.geometry import Array, Face, extent
 from apo_bench.planning.insertion.arrival import Arrival
 
@@ -53,7 +53,7 @@ def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> fl
     if assembly.is_round(contact):
         ends = [outline_points(assembly, of, poses) @ way for of in contact]
         return max(0.0, float(min(end.max() for end in ends) - max(end.min() for end in ends)))
-    corners = common_overlaps(assembly, [(contact, poses)])[0].corners
+    corners = Meetings(assembly).overlaps([(contact, poses)])[0].corners
     return float(np.ptp(corners @ way)) if len(corners) else 0.0
 
 

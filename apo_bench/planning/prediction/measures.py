@@ -22,13 +22,13 @@ import numpy as np
 from apo_bench.assembly import (
     Assembly,
     Contact,
+    Meetings,
     Operation,
     Plan,
     Poses,
     apart_limit_mm,
     contact_kind,
     deep_limit_mm,
-    meet,
     placements,
 )
 from apo_bench.geometry import Array, Mate
@@ -253,7 +253,7 @@ def _misfits_m(act: _Act, contacts: Sequence[Contact], how: Attach | None) -> li
     """
     way = None if how is None else act.planned[act.operation.main][:3, :3] @ how.direction
     out = []
-    for contact, lie in zip(contacts, meet(act.alone, ((c, act.planned) for c in contacts)), strict=True):
+    for contact, lie in zip(contacts, Meetings(act.alone).lies((c, act.planned) for c in contacts), strict=True):
         if contact_kind(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
             e, n = residual(act.alone, contact, lie, act.planned)
             along = way is not None and abs(n @ way) >= _ACROSS

@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses, measure_mate, meet
-from apo_bench.geometry import Array, Face, Mate, Overlap, RoundFace, pose
+from apo_bench.assembly import Assembly, Contact, Lie, Meetings, Operation, Poses, measure_mate
+from apo_bench.geometry import Array, Face, Mate, RoundFace, pose
 
 _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
@@ -47,11 +47,11 @@ def residuals(assembly: Assembly, contacts: Sequence[Contact], poses: Poses) -> 
     Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
     shaft on a plane the ends of the line of contact. The normal, (3,), is that of the flat face, world.
     """
-    lies = meet(assembly, ((contact, poses) for contact in contacts))
+    lies = Meetings(assembly).lies((contact, poses) for contact in contacts)
     return [residual(assembly, *pair, poses) for pair in zip(contacts, lies, strict=True)]
 
 
-def residual(assembly: Assembly, contact: Contact, lie: Mate | Overlap, poses: Poses) -> tuple[Array, Array]:
+def residual(assembly: Assembly, contact: Contact, lie: Lie, poses: Poses) -> tuple[Array, Array]:
     """`residuals` of one contact whose faces lie so to each other."""
     m, e = contact
     if isinstance(lie, Mate):

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses, common_overlaps, meet, placements
-from apo_bench.geometry import Array, Face, Mate, Overlap, RoundFace, across_axis, all_boxes, pose
+from apo_bench.assembly import Assembly, Contact, Lie, Meetings, Operation, Poses, placements
+from apo_bench.geometry import Array, Face, Overlap, RoundFace, across_axis, all_boxes, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
@@ -77,7 +77,7 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
     from scipy.optimize import nnls
 
-    lies = meet(assembly, ((contact, poses) for contact in operation.contacts))
+    lies = Meetings(assembly).lies((contact, poses) for contact in operation.contacts)
     pushing = [pushes(assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
@@ -100,7 +100,7 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
     """
     heights = [float((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) for _, e in operation.contacts]
     level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]
-    common = common_overlaps(assembly, ((contact, poses) for contact, _ in level))
+    common = Meetings(assembly).overlaps(((contact, poses) for contact, _ in level))
     ups = [float(np.sign(up)) for _, up in level]
     points = np.concatenate([np.zeros((0, 3)), *(each.corners for each in common)])
     return points, np.repeat(ups, [len(each.corners) for each in common]), ups
@@ -148,11 +148,11 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     return np.concatenate([points, *[held] * 4]), np.concatenate([n, *(m + side for side in sides)])
 
 
-def pushes(assembly: Assembly, contact: Contact, lie: Mate | Overlap, poses: Poses) -> Pushes:
+def pushes(assembly: Assembly, contact: Contact, lie: Lie, poses: Poses) -> Pushes:
     """What the second part of a contact, which rests, can push the first one with.
 
     Args:
-        lie: How the faces lie to each other, from `meet`.
+        lie: How the faces lie to each other, from `Meetings`.
     """
     m, e = contact
     nothing = np.zeros((0, 3))
