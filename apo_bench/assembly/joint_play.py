@@ -11,6 +11,7 @@ from math import cos, pi
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly.contact_kinds import contact_kind, play_mm
 from apo_bench.assembly.poses import Poses
@@ -100,28 +101,34 @@ def apart_limit_mm(
 
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
-    """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones.
-
-    With normals n into the free side and points p a motion (v, w) opens n v + (p x n) w.
-    """
+    """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones."""
     if not {contact_kind(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
     if contact_kind(*faces[which]) == "shaft in hole":
         return None
+    rows, limits, owners = _touch_rows(faces, at, clearance_mm)
+    widest = _widest(rows[owners == which], rows, limits)
+    return round(widest, _DIGITS) if np.isfinite(widest) else None
+
+
+@lru_cache(maxsize=64)
+def _touch_rows(
+    faces: tuple[tuple[AnyFace, AnyFace], ...], at: bytes, clearance_mm: float
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """By how much motions (v [mm], w [mm at the lever]) open pairs of faces at each point where they touch, (k, 6).
+
+    Also how deep each point may come, (k,), [mm], and the pair that it belongs to, (k,).
+    """
     T = np.frombuffer(at).reshape(4, 4)
     # Flat faces are measured in one call.
     flat = iter(overlaps([Laid(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]))
     touches = [_touch(a, b, T, clearance_mm, flat) for a, b in faces]
+    owners = np.repeat(np.arange(len(touches)), [len(touch.points) for touch in touches])
+    points = np.concatenate([touch.points for touch in touches])
+    normals = np.concatenate([touch.normals for touch in touches])
     # A small motion moves point p by v + w x p, of which n . (v + w x p) = n . v + (p x n) . w opens the contact.
-    rows = np.concatenate([_rows(touch) for touch in touches])
-    limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
-    widest = _widest(_rows(touches[which]), rows, limits)
-    return round(widest, _DIGITS) if np.isfinite(widest) else None
-
-
-def _rows(touch: _Touch) -> Array:
-    """By how much motions (v [mm], w [mm at the lever]) open a contact at each point, (k, 6)."""
-    return np.concatenate([touch.normals, np.cross(1e3 * touch.points, touch.normals) / _LEVER_MM], axis=1)
+    rows = np.concatenate([normals, np.cross(1e3 * points, normals) / _LEVER_MM], axis=1)
+    return rows, np.array([touch.limit_mm for touch in touches])[owners], owners
 
 
 def _widest(own: Array, rows: Array, limits: Array) -> float:

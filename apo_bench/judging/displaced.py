@@ -42,7 +42,7 @@ def displacements(
 
 
 def faults_of_place(
-    known: Meetings, after: _After, final: Snapshot, away: Collection[str], seen: Poses
+    known: Meetings, after: _After, final: Snapshot, away: Collection[str], seen: Poses, allowed_mm: float
 ) -> Iterator[tuple[str, float]]:
     """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
 
@@ -55,12 +55,16 @@ def faults_of_place(
         known: The contacts, with what is measured already.
         away: Parts that do not count.
         seen: The final poses, each part turned by the symmetry by which its contacts are judged.
+        allowed_mm: Parts are passed over that moved no farther in the room.
     """
     assembly = known.assembly
     last = last_moves(assembly)
     room = dict(displacements(assembly, after, final, away))
     for parts, contacts in _standing(assembly, away).items():
         a, b = parts
+        moved = max(room.get(a, 0.0), room.get(b, 0.0))
+        if 1e3 * moved <= allowed_mm:
+            continue
         if a in assembly.fixed:
             if b in room and _is_mate(assembly, contacts, b, seen):
                 yield f"{b} against {a}", room[b]
@@ -69,7 +73,7 @@ def faults_of_place(
         if put is not None:
             held = _held(known, contacts, (a, b), final.poses[a], seen)
             slid = _slid(assembly, (a, b), put.poses, final.poses, held)
-            yield f"{b} against {a}", min(slid, max(room.get(a, 0.0), room.get(b, 0.0)))
+            yield f"{b} against {a}", min(slid, moved)
 
 
 def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str], list[Contact]]:

@@ -31,13 +31,17 @@ def judge_finished(judge: ContactJudge, reached: Reached, reference: Array) -> J
     if final is None:
         return judgement((), (), (), judge.thresholds, all_made=False)
     away = fixtures(assembly)
+    limits = judge.thresholds
     true = placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
     return judgement(
         judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],
-        [(what, 1e3 * m) for what, m in faults_of_place(judge.known, reached.after, final, away, seen)],
-        judge.thresholds,
+        [
+            (what, 1e3 * m)
+            for what, m in faults_of_place(judge.known, reached.after, final, away, seen, limits.displaced_mm)
+        ],
+        limits,
         all_made=all_made,
         disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
     )
