@@ -29,7 +29,7 @@ _EXPORTS = MappingProxyType(
         "Arm": "apo_bench.simulation.arms.arm",
         "Assembly": "apo_bench.assembly.topology",
         "ContactCorrector": "apo_bench.correction.contact.contact",
-        "Corrected": "apo_bench.envs.corrected",
+        "CorrectPoses": "apo_bench.envs.corrected",
         "Correction": "apo_bench.assembly.correction_record",
         "Criteria": "apo_bench.records.thresholds",
         "Demonstration": "apo_bench.assembly.demonstration",

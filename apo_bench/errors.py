@@ -17,7 +17,14 @@ RAISED = (Exception, SystemExit)
 
 
 class InputError(ValueError):
-    """A request or a file that cannot be honoured; its message is one clear sentence (CLI: exit code 2)."""
+    """An argument or a file is wrong; the message is one sentence with cause and remedy (command line: exit code 2).
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.load_scenario("stick_in_towr")
+        Traceback (most recent call last):
+        apo_bench.errors.InputError: unknown scenario 'stick_in_towr'; ...
+    """
 
 
 class ArgumentError(InputError):

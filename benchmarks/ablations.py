@@ -17,10 +17,10 @@ from apo_bench.assembly import (
     Correction,
     Observation,
     Operation,
-    contact_equations,
-    largest,
-    largest_gap,
-    placements,
+    build_contact_equations,
+    compute_placements,
+    find_largest_residual,
+    measure_largest_gap,
 )
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
@@ -59,11 +59,11 @@ def no_disappeared(observation: Observation) -> Correction:
     if not observation.observed.all():
         return refuse_correction(observation)
     standing = np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(without_lost(observation.assembly), ~(before <= observation.gap_m)[standing])
     solution = solve_newton(system.among(standing & system.containing(freed)), observation.poses, freed)
-    status = solver_status(solution, largest(system.gaps(solution.poses)[standing]), observation.gap_m)
+    status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)[standing]), observation.gap_m)
     goals = solution.poses
     if status == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
@@ -74,8 +74,8 @@ def no_disappeared(observation: Observation) -> Correction:
         status=status,
         sentence=status_sentence(status, observation.gap_m, kept),
         freed=freed,
-        gap_before_m=largest(before),
-        gap_after_m=largest(system.gaps(goals)),
+        gap_before_m=find_largest_residual(before),
+        gap_after_m=find_largest_residual(system.gaps(goals)),
         rank=solution.rank,
         trace=solution.trace,
     )
@@ -110,10 +110,10 @@ def no_history(observation: Observation) -> Correction:
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
     poses = _poses(observation, tuple(last))
     end = _end(observation.assembly, tuple(last))
-    system = contact_equations(end, observation.start, poses)
+    system = build_contact_equations(end, observation.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(free)), poses, free)
-    status = solver_status(solution, largest(system.gaps(solution.poses)), observation.gap_m)
+    status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)), observation.gap_m)
     freed = _main(observation.assembly, last, free)
     goals = np.array(observation.poses)
     goals[list(freed)] = solution.poses[list(freed.values())]
@@ -122,8 +122,8 @@ def no_history(observation: Observation) -> Correction:
         status=status,
         sentence=status_sentence(status, observation.gap_m, "every contact that stands at the end"),
         freed=tuple(freed),
-        gap_before_m=largest_gap(observation.assembly, observation.start, observation.poses),
-        gap_after_m=largest_gap(observation.assembly, observation.start, goals),
+        gap_before_m=measure_largest_gap(observation.assembly, observation.start, observation.poses),
+        gap_after_m=measure_largest_gap(observation.assembly, observation.start, goals),
         rank=solution.rank,
         trace=solution.trace,
     )
@@ -131,7 +131,7 @@ def no_history(observation: Observation) -> Correction:
 
 def _poses(observation: Observation, parts: tuple[str, ...]) -> Array:
     """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
-    final = placements(observation.assembly, observation.start, observation.poses)[-1] if parts else {}
+    final = compute_placements(observation.assembly, observation.start, observation.poses)[-1] if parts else {}
     return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
 
 

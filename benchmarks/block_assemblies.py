@@ -12,12 +12,12 @@ import numpy as np
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.writing import write_scenario
-from apo_bench.scenario.parts.making import Body, extrude, join, polygon, rectangle
+from apo_bench.scenario.parts.making import Body, extrude, join, make_polygon, make_rectangle
 from benchmarks.generated import Assembled, Between, Place, write
 
 
 def block(w: float, d: float, h: float) -> Body:
-    return extrude(rectangle(w, d, names=("ny", "px", "py", "nx")), 0, h, bottom="bottom", top="top")
+    return extrude(make_rectangle(w, d, names=("ny", "px", "py", "nx")), 0, h, bottom="bottom", top="top")
 
 
 def slot(width: float, wide: float, floor: float, deep: float, length: float) -> Body:
@@ -25,7 +25,7 @@ def slot(width: float, wide: float, floor: float, deep: float, length: float) ->
     w = wide / 2
     out = width / 2
     top = floor + deep
-    section = polygon(
+    section = make_polygon(
         (-out, 0), (out, 0), (out, top), (w, top), (w, floor), (-w, floor), (-w, top), (-out, top),
         names={0: "bottom", 2: "top_p", 3: "slot_p", 4: "floor", 5: "slot_n", 6: "top_n"},
         fit=("slot_p", "floor", "slot_n"),
@@ -59,13 +59,13 @@ def capped(between: Between, rng: np.random.Generator) -> Assembled:
     length = between(60, 90)
     width = between(60, 80)
     thick = between(10, 14)
-    rail = extrude(rectangle(length, wide), thick, thick + high, top="ridge").prefixed("rail_")
+    rail = extrude(make_rectangle(length, wide), thick, thick + high, top="ridge").prefixed("rail_")
     base = join(block(width + 30, width + 10, thick), rail)
     outer = between(40, 46)
     top = between(16, 24)
     w = wide / 2
     out = outer / 2
-    section = polygon(
+    section = make_polygon(
         (-out, 0), (-w, 0), (-w, high), (w, high), (w, 0), (out, 0), (out, high + top), (-out, high + top),
         names={0: "foot_n", 1: "slot_n", 2: "roof", 3: "slot_p", 4: "foot_p", 6: "top"},
         fit=("slot_p", "slot_n"),
@@ -106,7 +106,7 @@ def stepped(between: Between, rng: np.random.Generator) -> Assembled:
     w = between(30, 40)
     d = between(26, 34)
     wall = round(low + high - between(4, 10), 1)
-    upright = extrude(rectangle(14, 70, (-47, 0)), thick, thick + wall).prefixed("wall_")
+    upright = extrude(make_rectangle(14, 70, (-47, 0)), thick, thick + wall).prefixed("wall_")
     parts = {
         "plate": join(block(120, 80, thick), upright),
         "low": block(w, d, low),
@@ -126,11 +126,13 @@ def tunnelled(between: Between, rng: np.random.Generator) -> Assembled:
     out = w + between(12, 16)
     length = between(40, 56)
     top = floor + h + between(12, 18)
-    outside = polygon(
+    outside = make_polygon(
         (-out, 0), (out, 0), (out, top), (-out, top), names={0: "bottom", 1: "side_p", 2: "top", 3: "side_n"}
     )
     walls = ("floor", "wall_p", "roof", "wall_n")
-    hole = polygon((-w, floor), (w, floor), (w, floor + h), (-w, floor + h), names=dict(enumerate(walls)), fit=walls)
+    hole = make_polygon(
+        (-w, floor), (w, floor), (w, floor + h), (-w, floor + h), names=dict(enumerate(walls)), fit=walls
+    )
     tower = extrude(outside, 0, length, holes=[hole]).moved(turn_deg=(90, 0, 90))
     xs = (0.0, round(length + between(10, 20), 1)) if rng.uniform() < 0.5 else (0.0,)
     end = xs[-1] + length

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -26,7 +26,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from apo_bench import Correction, Observation, correct, correct_many
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 from benchmarks.corrector_problems import observe, problem
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "corrector.md"
@@ -57,7 +57,7 @@ def find_optimum(observation: Observation, begin: Array) -> Array:
     """Return the shortest z that closes all contacts, (6 n,); the search starts at `begin`."""
     n = len(observation.poses)
     L = np.linalg.cholesky(observation.covariance)
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
 
     def displace(z: Array) -> tuple[Array, Array]:
         xi = (L @ z.reshape(n, 6, 1))[..., 0]
@@ -69,7 +69,7 @@ def find_optimum(observation: Observation, begin: Array) -> Array:
     def slopes(z: Array) -> Array:
         xi, poses = displace(z)
         J = system.linearise(poses)[1].reshape(-1, n, 6)
-        return 1e3 * np.einsum("mki,kij->mkj", J, right_jacobian(xi) @ L).reshape(-1, 6 * n)
+        return 1e3 * np.einsum("mki,kij->mkj", J, compute_right_jacobian(xi) @ L).reshape(-1, 6 * n)
 
     # SLSQP needs independent constraints: keep the directions that the contacts fix at the start.
     U, w, _ = np.linalg.svd(slopes(begin), full_matrices=False)

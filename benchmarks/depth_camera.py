@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream
 
@@ -56,7 +56,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=30)
     parser.add_argument("--noise-level", type=float, nargs="+", default=[1.0])
-    parser.add_argument("--scenarios", nargs="+", default=list(scenario_names()))
+    parser.add_argument("--scenarios", nargs="+", default=list(list_scenario_names()))
     parser.add_argument("--human-error-scale", type=float, default=1.0)
     given = parser.parse_args()
     print("| scenario | noise level | located | mm | deg | chi-square / 6 | seconds |\n" + "|---" * 7 + "|")

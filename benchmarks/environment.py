@@ -16,7 +16,7 @@ from pathlib import Path
 import gymnasium
 
 from apo_bench import TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from apo_bench.trial.stages import simulate_demonstration
 from benchmarks.rates_by_condition import table
 
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("scenarios", nargs="*", help="scenarios to run again (all but gearbox)")
     given = parser.parse_args()
     counts = read_counts()
-    for scenario in given.scenarios or [name for name in scenario_names() if name != LEFT_OUT]:
+    for scenario in given.scenarios or [name for name in list_scenario_names() if name != LEFT_OUT]:
         counts[scenario, "random"] = count_random_actions(scenario)
         for method in POLICIES[1:]:
             counts[scenario, method] = count_trials(scenario, method)

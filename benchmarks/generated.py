@@ -20,10 +20,10 @@ from apo_bench.scenario.parts.making import (
     bore,
     extrude,
     join,
-    polygon,
-    rectangle,
+    make_polygon,
+    make_rectangle,
+    make_shaft,
     revolve,
-    shaft,
     write_part,
 )
 
@@ -70,9 +70,9 @@ def pinned(between: Between, rng: np.random.Generator) -> Assembled:
 
     def plate(w: float, d: float, h: float, radius: float) -> Body:
         bores = [bore(xy, radius, 0, h, f"bore_{i}") for i, xy in enumerate(at, start=1)]
-        return extrude(rectangle(w, d), 0, h, bores=bores, bottom="bottom", top="top")
+        return extrude(make_rectangle(w, d), 0, h, bores=bores, bottom="bottom", top="top")
 
-    pin = shaft(r, 0, length, "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head")
+    pin = make_shaft(r, 0, length, "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head")
     parts = {
         "plate": plate(width, depth, thick, r + play),
         "pin": pin,
@@ -91,7 +91,7 @@ def bushed(between: Between, rng: np.random.Generator) -> Assembled:
     play = between(0.2, 0.4)
     flange = between(14, 18)
     bores = [bore((x, 0), outer + play, 0, thick, f"bore_{i}") for i, x in enumerate((-width / 4, width / 4), start=1)]
-    block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
+    block = extrude(make_rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
     inner = [Frustum(0, thick + flange, r + play, name="bore")]
     walls = [Frustum(0, thick, outer, name="side"), Frustum(thick, thick + flange, outer + 4, name="rim")]
     bush = revolve(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
@@ -116,15 +116,15 @@ def bracketed(between: Between, rng: np.random.Generator) -> Assembled:
     high = between(34, 42)
     peg = between(3, 4)
     width = between(34, 40)
-    plate = extrude(rectangle(150, width + 20), 0, thick, bottom="bottom", top="top")
+    plate = extrude(make_rectangle(150, width + 20), 0, thick, bottom="bottom", top="top")
     pegs = [
-        shaft(peg, thick, thick + 12, "peg", chamfer_high=1).moved((x, y, 0)).prefixed(f"p{i}_")
+        make_shaft(peg, thick, thick + 12, "peg", chamfer_high=1).moved((x, y, 0)).prefixed(f"p{i}_")
         for i, (x, y) in enumerate([(s * (far + 20), t * 9.0) for s in (-1, 1) for t in (-1, 1)], start=1)
     ]
     holes = [bore((20 - 25, t * 9.0), peg + play, 0, 10, f"hole_{i}") for i, t in enumerate((-1, 1), start=1)]
-    foot = extrude(rectangle(50, width), 0, 10, bores=holes, bottom="bottom", top="tread")
+    foot = extrude(make_rectangle(50, width), 0, 10, bores=holes, bottom="bottom", top="tread")
     wall = extrude(
-        rectangle(high + r + 12 - 10, width, (-(high + r + 12 + 10) / 2, 0)),
+        make_rectangle(high + r + 12 - 10, width, (-(high + r + 12 + 10) / 2, 0)),
         0,
         12,
         bores=[bore((-high, 0), r + play, 0, 12, "bore")],
@@ -133,8 +133,8 @@ def bracketed(between: Between, rng: np.random.Generator) -> Assembled:
     )
     bracket = join(foot, wall.moved(turn_deg=(0, 90, 0)).moved((-25, 0, 0)))
     length = round(2 * far + 24 + between(10, 20), 1)
-    head = extrude(rectangle(2 * r, 2 * r), -22, 0, bottom="end")
-    rod = join(head, shaft(r, 0, length, "side", chamfer_high=1, top="tip")).moved(turn_deg=(0, 90, 0))
+    head = extrude(make_rectangle(2 * r, 2 * r), -22, 0, bottom="end")
+    rod = join(head, make_shaft(r, 0, length, "side", chamfer_high=1, top="tip")).moved(turn_deg=(0, 90, 0))
     half = (0.0, 0.0, 0.0, 1.0)
     places = (
         Place("plate", "plate", (0, 0, 0)),
@@ -157,7 +157,7 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
     w = wide / 2
     out = wide / 2 + side
     top = floor + deep
-    section = polygon(
+    section = make_polygon(
         (-out, 0), (out, 0), (out, top), (w, top), (w, floor), (-w, floor), (-w, top), (-out, top),
         names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
         fit=("slot_p", "floor", "slot_n"),
@@ -167,9 +167,9 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
     xs = (-length / 4, length / 4)
     blind = [bore((x, 0), r + play, 0, high, f"bore_{i}") for i, x in enumerate(xs, start=1)]
     key = extrude(
-        rectangle(length, wide, names=("ny", "px", "py", "nx")), 0, high, bores=blind, bottom="bottom", top="top"
+        make_rectangle(length, wide, names=("ny", "px", "py", "nx")), 0, high, bores=blind, bottom="bottom", top="top"
     )
-    pin = shaft(
+    pin = make_shaft(
         r, 0, round(high + between(24, 30), 1), "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head"
     )
     thick = between(10, 14)
@@ -193,8 +193,8 @@ def stacked(between: Between, rng: np.random.Generator) -> Assembled:
     heights = [between(12, 18) for _ in range(3)]
     post = thick + sum(heights[:count]) + 8
     foot = join(
-        extrude(rectangle(between(90, 110), between(70, 90)), 0, thick, bottom="bottom", top="top"),
-        shaft(r, thick, post, "post", chamfer_high=1.5, top="end"),
+        extrude(make_rectangle(between(90, 110), between(70, 90)), 0, thick, bottom="bottom", top="top"),
+        make_shaft(r, thick, post, "post", chamfer_high=1.5, top="end"),
     )
     parts: dict[str, Body] = {"foot": foot}
     places = [Place("foot", "foot", (0, 0, 0))]
@@ -202,7 +202,7 @@ def stacked(between: Between, rng: np.random.Generator) -> Assembled:
     for i, h in enumerate(heights[:count], start=1):
         hole = [bore((0, 0), r + play, 0, h, "bore")]
         parts[f"plate_{i}"] = extrude(
-            rectangle(between(50, 64), between(40, 50)), 0, h, bores=hole, bottom="bottom", top="top"
+            make_rectangle(between(50, 64), between(40, 50)), 0, h, bores=hole, bottom="bottom", top="top"
         )
         places.append(Place(f"plate_{i}", f"plate_{i}", (0, 0, round(z, 1))))
         z += h

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import imageio.v3 as imageio
 import numpy as np
 
-from apo_bench.assembly import placements
+from apo_bench.assembly import compute_placements
 from apo_bench.benchmark.analysis import Rate
 from apo_bench.importers.assembly.checking import check_file
 from apo_bench.importers.assembly.posed import TABLE
@@ -130,7 +130,7 @@ def draw(paths: Sequence[Path]) -> None:
     for path in paths:
         scene = build_scene(load_scenario(path))
         scenario = scene.scenario
-        poses = placements(scenario.assembly, scenario.start, scenario.goals)[-1]
+        poses = compute_placements(scenario.assembly, scenario.start, scenario.goals)[-1]
         middle = np.mean([poses[part][:3, 3] for part in scenario.assembly.fixed if part != TABLE], axis=0)
         view = aim_camera(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
         views.append(draw_picture(scene, poses, 300, 260, view))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import ConditionResult, Paired, Rate, wilson
+from apo_bench.benchmark.analysis import ConditionResult, PairedComparison, Rate, compute_wilson_interval
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.grid import describe_grids, load_all
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
@@ -35,7 +35,9 @@ OLDER = " **`benchmarks/headline.toml` has changed since.**"
 Words = Callable[[ConditionResult], tuple[str, ...]]
 
 
-def page(summary: Summary, pairs: Sequence[Paired], ran: Mapping[str, Any], fidelity: Sequence[str]) -> list[str]:
+def page(
+    summary: Summary, pairs: Sequence[PairedComparison], ran: Mapping[str, Any], fidelity: Sequence[str]
+) -> list[str]:
     """Return the lines of the page."""
     least = min(cell.trials for cell in summary.cells)
     plain = [c for c in summary.cells if c.noise == TrialConfig.noise and c.robot_error == TrialConfig.robot_error]
@@ -112,7 +114,7 @@ def _both(cell: ConditionResult) -> str:
 
 
 def _widths(trials: int) -> str:
-    low, half, high = (wilson(round(share * trials), trials) for share in (0.0, 0.5, 1.0))
+    low, half, high = (compute_wilson_interval(round(share * trials), trials) for share in (0.0, 0.5, 1.0))
     return (
         f"Of {trials} trials, 0 % has a 95 % interval (Wilson) of 0 to {100 * low.high:.0f} %, 50 % one of "
         f"{100 * half.low:.0f} to {100 * half.high:.0f} %, 100 % one of {100 * high.low:.0f} to 100 %."
@@ -130,7 +132,7 @@ def _section(title: str, text: str, head: str, row: Words, cells: Sequence[Condi
     return [title, "", text, "", *map("".join, zip(lines, added, strict=True)), ""]
 
 
-def _differences(pairs: Sequence[Paired]) -> list[str]:
+def _differences(pairs: Sequence[PairedComparison]) -> list[str]:
     compared = [
         p for p in pairs if p.condition.method in COMPARED and not is_uncorrected(p.condition.method) and p.pairs
     ]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.benchmark.analysis import Rate, tango
+from apo_bench.benchmark.analysis import Rate, compute_tango_interval
 from apo_bench.records import TrialRecord
 from benchmarks.provenance import mujoco_of, share_of_sweep, with_mujoco
 from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
@@ -135,7 +135,7 @@ def compare(noise: str, rows: Iterable[TrialRecord]) -> list[object]:
     both = [end for end in ends.values() if {"contact", "contact-robust"} <= set(end)]
     plain, robust = (sum(end[method] for end in both) for method in ("contact", "contact-robust"))
     won = sum(end["contact-robust"] and not end["contact"] for end in both)
-    low, high = tango(won, won - (robust - plain), len(both))
+    low, high = compute_tango_interval(won, won - (robust - plain), len(both))
     difference = f"{100 * (robust - plain) / max(1, len(both)):+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})"
     return [NOISES.get(noise, f"`{noise}`"), len(both), plain, robust, difference]
 

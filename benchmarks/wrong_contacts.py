@@ -24,12 +24,12 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import Assembly, Demonstration, draw_layout, load_scenario
-from apo_bench.assembly import Meetings, Plan, placements
+from apo_bench.assembly import Meetings, Plan, compute_placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.pose_error import goal_errors
@@ -65,9 +65,9 @@ def is_right(scenario: Scenario, shown: Demonstration, poses: Array) -> bool:
     assembly = shown.assembly
     if goal_errors(assembly, shown.start, shown.poses, poses)[0] > CLEARANCE_MM:
         return False
-    for operation, placed in zip(assembly.operations, placements(assembly, shown.start, poses), strict=True):
+    for operation, placed in zip(assembly.operations, compute_placements(assembly, shown.start, poses), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))
-        if not all(Meetings(assembly).overlaps((contact, placed) for contact in flat)):
+        if not all(Meetings(assembly).measure_overlaps((contact, placed) for contact in flat)):
             return False
     return not predict(Plan(assembly, shown.start, poses), CLEARANCE_MM, scenario.thresholds, scenario.attach).fails
 
@@ -87,7 +87,7 @@ def count_draw(seed: int, kind: str, name: str) -> Iterator[str]:
     exact = np.zeros((len(layout.poses), 6, 6))
     shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, exact)
     observation = observe(shown, make_noise("isotropic", NoiseLevel(1.0, 1.0)), np.random.default_rng([seed, 32, 1]))
-    wrong = with_contacts(observation, make_contacts(kind), layout.poses, np.random.default_rng([seed, 32, 2]))
+    wrong = replace_contacts(observation, make_contacts(kind), layout.poses, np.random.default_rng([seed, 32, 2]))
     ceiling = replace(observation, assembly=keep_true_contacts(observation.assembly, wrong.assembly))
     yield "draws"
     for method in METHODS:

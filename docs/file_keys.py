@@ -16,7 +16,7 @@ from fields import sentences
 
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED
 from apo_bench.benchmark.sweeps.sweep_file import SweepTable
-from apo_bench.cli.shared.setting_options import shown_default
+from apo_bench.cli.shared.setting_options import format_default
 from apo_bench.importers.assembly.writing import THRESHOLDS
 from apo_bench.perception.observation import noise_file
 from apo_bench.records import SETTINGS, SettingInfo
@@ -60,7 +60,7 @@ def sweep_meanings() -> dict[str, str]:
 def default_of(info: SettingInfo) -> str:
     """Return the default of a sweep in words."""
     return ", ".join(f"`{value:g}`" if isinstance(value, float) else f"`{value}`" for value in info.swept) or (
-        info.usual or f"`{shown_default(info)}`"
+        info.usual or f"`{format_default(info)}`"
     )
 
 
@@ -279,7 +279,7 @@ def keys_of(table: type[msgspec.Struct]) -> tuple[frozenset[str], frozenset[str]
 
 
 def noise_keys() -> Keys:
-    types = {"": noise_file.NoiseTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable}
+    types = {"": noise_file.NoiseFileTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable}
     return {table: keys_of(of) for table, of in types.items()}
 
 

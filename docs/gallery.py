@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.simulation.scene.render import aim_camera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import simulate_demonstration
@@ -25,7 +25,7 @@ AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, if not the usual sid
 
 
 def main() -> None:
-    names = scenario_names()
+    names = list_scenario_names()
     figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.4), layout="constrained")
     for axis in axes.flat:
         axis.axis("off")

@@ -11,9 +11,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.assembly import relation_graph
+from apo_bench.assembly import build_relation_graph
 from apo_bench.scenario import Scenario
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import list_scenario_names, load_scenario
 from apo_bench.viz.graph_picture import draw_graph
 from apo_bench.viz.task_sheet import task_sheet
 from benchmarks.baselines import HEAD, describe, describe_nominal, read_counts
@@ -51,7 +51,7 @@ def page(scenarios: Sequence[Scenario], measured: Mapping[str, str]) -> str:
 
 
 def main() -> None:
-    scenarios = [load_scenario(name) for name in scenario_names()]
+    scenarios = [load_scenario(name) for name in list_scenario_names()]
     counts = read_counts()
     measured = {scenario.name: describe(scenario, counts) for scenario in scenarios}
     PAGE.write_text(page(scenarios, measured), encoding="utf-8")
@@ -59,7 +59,7 @@ def main() -> None:
     table = f"{FIRST}\n{describe_nominal(scenarios, counts)}\n{LAST}"
     JUDGE.write_text(before + table + rest.partition(LAST)[2], encoding="utf-8")
     for scenario in scenarios:
-        graph = relation_graph(scenario.assembly)
+        graph = build_relation_graph(scenario.assembly)
         path = PAGE.parent / PICTURE.format(scenario.name)
         draw_graph(graph, path, f"{scenario.name} after operation {graph.step}", colors=scenario.colors)
 

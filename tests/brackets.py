@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly import Operation
-from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, cylinder_hull, pose
+from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, make_cylinder_hull, pose
 from tests import rounds
 from tests.scenes import Scene, box_faces, mm, scene, table, touch
 
@@ -22,7 +22,7 @@ def pins() -> Solid:
         at = np.array([x, 0.0, 0.0])
         walls[f"{name}_pin"] = RoundFace(f"{name}_pin", at, Z, (0.01, 0.039), (0.004, 0.004), False)
         walls[f"{name}_tip"] = RoundFace(f"{name}_tip", at, Z, (0.039, 0.04), (0.004, 0.003), False)
-        found.append(cylinder_hull(f"{name}_pin", Cylinder(at + 0.0245 * Z, Z, 0.004, 0.0145)))
+        found.append(make_cylinder_hull(f"{name}_pin", Cylinder(at + 0.0245 * Z, Z, 0.004, 0.0145)))
         tip = np.concatenate([rounds.ring(4, 39), rounds.ring(3, 40)])
         found.append(Hull(f"{name}_tip", at + tip))
     flat = {face.name: face for face in box_faces((50, 20, 10))}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from apo_bench import Criteria, Verdict, judge
-from apo_bench.assembly import Reached, Snapshot, placements
+from apo_bench.assembly import ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.judgement import Judgement
 from apo_bench.records import Thresholds
@@ -77,7 +77,7 @@ def never(*moments: int) -> Edit:
 def reached(scene: scenes.Scene, edits: Sequence[Edit]) -> list[dict]:
     """After each operation and at the end: everything as it should be but for the edits."""
     there = scenes.turned(scene, LAYOUT)
-    history = placements(there.assembly, there.start, there.goals)
+    history = compute_placements(there.assembly, there.start, there.goals)
     states: list[dict] = [dict(poses) for poses in (*history, history[-1])]
     for edit in edits:
         edit(states)
@@ -89,7 +89,10 @@ def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds =
     there = scenes.turned(scene, LAYOUT)
     snapshots = [snapshot(state) if state else None for state in reached(scene, edits)]
     return judge(
-        there.assembly, Reached(tuple(snapshots[:-1]), snapshots[-1]), there.goals, Criteria(thresholds, CLEARANCE_MM)
+        there.assembly,
+        ReachedState(tuple(snapshots[:-1]), snapshots[-1]),
+        there.goals,
+        Criteria(thresholds, CLEARANCE_MM),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench import load_scenario
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 
 RATE_HZ = 30.0
 _MOVE_S = 1.0
@@ -23,7 +23,7 @@ CAMERA = pose.at((0.9, -0.2, 0.8), (-130.0, 20.0, 60.0))
 def motion(name: str) -> tuple[Array, Mapping[str, Array]]:
     """Times (n,), and the pose of every moved part at them, (n, 4, 4), world: operation after operation, from above."""
     scenario = load_scenario(name)
-    layout = layout_at(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm)
+    layout = place_layout(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm)
     now = {part: T for part, T in layout.start.items() if part not in scenario.assembly.fixed}
     frames = [dict(now)] * round(_REST_S * RATE_HZ)
     for operation, goal in zip(scenario.assembly.operations, layout.poses, strict=True):

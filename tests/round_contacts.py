@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench import Assembly, Observation
 from apo_bench.assembly import Contact, Gap, Operation, PartFace
-from apo_bench.geometry import Box, Cylinder, Face, Hull, Piece, RoundFace, Solid, cylinder_hull, pose, sides_of
+from apo_bench.geometry import Box, Cylinder, Face, Hull, Piece, RoundFace, Solid, count_sides, make_cylinder_hull, pose
 
 Z = np.array([0.0, 0.0, 1.0])
 MM = 1e-3
@@ -38,7 +38,7 @@ def wall(
 
 def tube(outer: float, inner: float, low: float, high: float, sides: int | None = None) -> tuple[Hull, ...]:
     """What is between two circles, as prisms whose inner sides touch the smaller one."""
-    n = sides or sides_of(inner)
+    n = sides or count_sides(inner)
     found = []
     for i in range(n):
         turn = 2.0 * np.pi * (i + np.array([-0.5, 0.5])) / n
@@ -69,7 +69,7 @@ def plate(fit: bool = False, radius: float = 5 * MM) -> Solid:
 
 def pin(radius: float = 5 * MM) -> Solid:
     """50 mm long along z, with a shoulder face in its middle and cones at its lower end."""
-    shaft = cylinder_hull("shaft", Cylinder(25 * MM * Z, Z, radius, 25 * MM))
+    shaft = make_cylinder_hull("shaft", Cylinder(25 * MM * Z, Z, radius, 25 * MM))
     flats = (ring("bottom", 0.0, radius, up=False), ring("top", 50 * MM, radius, up=True))
     rounds = (
         wall("shaft", 0.0, 50 * MM, radius, False),

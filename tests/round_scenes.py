@@ -13,12 +13,14 @@ from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.attach import Preference
 from apo_bench.records import Thresholds
 from apo_bench.scenario.attach_lines import with_attach_lines
-from apo_bench.scenario.parts import load_part, part_path
-from apo_bench.scenario.parts.making import Body, bore, extrude, rectangle, shaft, write_part
+from apo_bench.scenario.parts import find_part_path, load_part
+from apo_bench.scenario.parts.making import Body, bore, extrude, make_rectangle, make_shaft, write_part
 from apo_bench.scenario.scenario import Grasp, Site
 
-PEG = shaft(5, -25, 25, "wall", bottom="bottom", top="top")
-PLATE = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 5, 0, 20, "bore", fit=True)], bottom="bottom", top="top")
+PEG = make_shaft(5, -25, 25, "wall", bottom="bottom", top="top")
+PLATE = extrude(
+    make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 5, 0, 20, "bore", fit=True)], bottom="bottom", top="top"
+)
 
 
 def contacts(main: str, *pairs: str) -> tuple[Contact, ...]:
@@ -50,7 +52,7 @@ def scenario(
         )
         for name, body in bodies.items()
     }
-    files = {"table": part_path("table"), **files}
+    files = {"table": find_part_path("table"), **files}
     made = Scenario(
         name="round",
         title="",

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import Operation
-from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, cylinder_hull, world_bounds
+from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, make_cylinder_hull, measure_world_bounds
 from tests.scenes import Scene, mm, scene, table, touch
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -70,7 +70,7 @@ def peg(name: str = "peg", radius: float = 5.0, length: float = 50.0) -> Solid:
         rim("edge", radius, 0, hole=False, upwards=False),
     ]
     shape = Cylinder(5e-4 * length * Z, Z, 1e-3 * radius, 5e-4 * length)
-    return solid(name, faces, [cylinder_hull("shaft", shape)], length / 2, np.pi * radius**2 * length)
+    return solid(name, faces, [make_cylinder_hull("shaft", shape)], length / 2, np.pi * radius**2 * length)
 
 
 def bored(radius: float, outer: float, height: float, *, wide: bool = False) -> list[Hull]:
@@ -138,7 +138,7 @@ def plug(name: str = "plug") -> Solid:
         up("top", ring(9, 16)),
     ]
     lower = Hull("cone", np.concatenate([ring(3, 0), ring(9, 6)]))
-    upper = cylinder_hull("head", Cylinder(0.011 * Z, Z, 0.009, 0.005))
+    upper = make_cylinder_hull("head", Cylinder(0.011 * Z, Z, 0.009, 0.005))
     return solid(name, faces, [lower, upper], 9.4, np.pi * (81 * 10 + 234))
 
 
@@ -349,7 +349,7 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
     start = dict(of.start)
     for i, (part, k) in enumerate(sorted(first.items())):
         T = np.array(of.goals[k])
-        low, _ = world_bounds([(of.assembly.solids[part], T)])
+        low, _ = measure_world_bounds([(of.assembly.solids[part], T)])
         T[:3, 3] += (0.2 * i - 0.5, 0.45, -low[2]) - T[:3, 3] * (1, 1, 0)
         start[part] = T
     n = len(of.assembly)

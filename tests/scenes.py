@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from apo_bench import Assembly, Demonstration, Observation
-from apo_bench.assembly import Contact, Operation, PartFace, placements
+from apo_bench.assembly import Contact, Operation, PartFace, compute_placements
 from apo_bench.geometry import Array, Box, Face, Solid, pose
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -288,7 +288,7 @@ def turned(scene: Scene, T_world: Array) -> Scene:
 def shown(scene: Scene, human_error_scale: Array | None = None) -> Demonstration:
     """A demonstration that shows the true goals."""
     n = len(scene.assembly)
-    final = placements(scene.assembly, scene.start, scene.goals)[-1]
+    final = compute_placements(scene.assembly, scene.start, scene.goals)[-1]
     added = np.zeros((n, 6, 6)) if human_error_scale is None else human_error_scale
     return Demonstration(scene.assembly, scene.start, scene.goals, final, added)
 

@@ -14,7 +14,7 @@ import pytest
 import trimesh
 
 import apo_bench
-from apo_bench.assembly import Outcome, Reached, Snapshot
+from apo_bench.assembly import Outcome, ReachedState, Snapshot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.formats.observation import as_planned
 from apo_bench.resources import folder
@@ -36,7 +36,7 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
     observation = apo_bench.observe(shown, "isotropic", np.random.default_rng(0))
     correction = apo_bench.correct(observation)
     at_rest = Snapshot(shown.final, 0.0, 0.0, 0.0, True)
-    reached = Reached((at_rest,) * len(assembly), at_rest)
+    reached = ReachedState((at_rest,) * len(assembly), at_rest)
     reference = simulated.layout.poses
     made = tmp_path_factory.mktemp("valid")
     rows = [f"{k},{each.main},0,0,30,1,0,0,0" for k, each in enumerate(assembly.operations, start=1)]

@@ -1,32 +1,46 @@
 """The topology of an assembly, and the poses that flow over it, in the words of the paper. No solver, no simulator."""
 
-from apo_bench.assembly.contact_kinds import ContactKind, contact_kind, geometric_play, play_mm
+from apo_bench.assembly.contact_kinds import ContactKind, classify_contact, compute_geometric_play, compute_play_mm
 from apo_bench.assembly.correction_record import (
     Consistency,
     Correction,
+    FreeingTrial,
     Hypothesis,
     Iterate,
     Reobserver,
     ReobservingCorrector,
     Suspect,
-    Try,
 )
 from apo_bench.assembly.demonstration import Demonstration, Layout
-from apo_bench.assembly.equations import Equations, contact_equations, largest, largest_gap
-from apo_bench.assembly.facing import face_gap, faces_oppose, height
-from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
-from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
-from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
-from apo_bench.assembly.meeting import Lie, Meetings, measure_mate
+from apo_bench.assembly.equations import Equations, build_contact_equations, find_largest_residual, measure_largest_gap
+from apo_bench.assembly.facing import faces_oppose, measure_face_gap, measure_height
+from apo_bench.assembly.facing_round import FacingPair, find_round_pairs, measure_round
+from apo_bench.assembly.graph import (
+    Arc,
+    ArcResiduals,
+    Graph,
+    Node,
+    build_relation_graph,
+    compute_arc_residuals,
+    compute_observed_residuals,
+)
+from apo_bench.assembly.joint_play import compute_apart_limit_mm, compute_deep_limit_mm, compute_joint_play_mm
+from apo_bench.assembly.meeting import Meeting, Meetings, measure_contact
 from apo_bench.assembly.observation import Observation
-from apo_bench.assembly.outlier_model import OutlierModel, measured_rates
-from apo_bench.assembly.pattern import Pattern, contact_pattern, faces_away
-from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, poses_in_force, schedule_fault
-from apo_bench.assembly.poses import Poses, placements
+from apo_bench.assembly.outlier_model import OutlierModel, make_measured_model
+from apo_bench.assembly.pattern import Pattern, find_contact_pattern, find_faces_away
+from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, find_schedule_fault, list_poses_in_force
+from apo_bench.assembly.poses import Poses, compute_placements
 from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
-from apo_bench.assembly.reached import InHand, Outcome, ProbingResult, Reached, ReplayResult, Snapshot
-from apo_bench.assembly.resting_contacts import TouchedContact, corners, mouth, outline_points, touched_contacts
-from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
+from apo_bench.assembly.reached import Outcome, ProbingResult, ReachedState, ReplayResult, SlipInHand, Snapshot
+from apo_bench.assembly.resting_contacts import (
+    TouchedContact,
+    find_touch_points,
+    find_touched_contacts,
+    list_outline_points,
+    measure_entrance_depth,
+)
+from apo_bench.assembly.shared_error import SharedError, compute_joint_covariance, correlate_first_order
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import (
     ODL,
@@ -37,9 +51,9 @@ from apo_bench.assembly.topology import (
     Operation,
     PartFace,
     Relation,
+    evaluate_odl,
     invert,
-    product,
-    simplify,
+    simplify_odl,
     spell,
 )
 from apo_bench.assembly.touch import Touch
@@ -56,15 +70,15 @@ __all__ = (
     "Correction",
     "Demonstration",
     "Equations",
-    "Facing",
+    "FacingPair",
+    "FreeingTrial",
     "Gap",
     "GapKind",
     "Graph",
     "Hypothesis",
-    "InHand",
     "Iterate",
     "Layout",
-    "Lie",
+    "Meeting",
     "Meetings",
     "Node",
     "Observation",
@@ -76,54 +90,54 @@ __all__ = (
     "Plan",
     "Poses",
     "ProbingResult",
-    "Reached",
+    "ReachedState",
     "Relation",
     "Reobserver",
     "ReobservingCorrector",
     "ReplayResult",
     "SharedError",
+    "SlipInHand",
     "Snapshot",
     "Step",
     "Suspect",
     "Tails",
     "Touch",
     "TouchedContact",
-    "Try",
-    "apart_limit_mm",
-    "arc_residuals",
-    "contact_equations",
-    "contact_kind",
-    "contact_pattern",
-    "corners",
-    "deep_limit_mm",
-    "face_gap",
-    "faces_away",
+    "build_contact_equations",
+    "build_relation_graph",
+    "classify_contact",
+    "compute_apart_limit_mm",
+    "compute_arc_residuals",
+    "compute_deep_limit_mm",
+    "compute_geometric_play",
+    "compute_joint_covariance",
+    "compute_joint_play_mm",
+    "compute_observed_residuals",
+    "compute_placements",
+    "compute_play_mm",
+    "correlate_first_order",
+    "evaluate_odl",
     "faces_oppose",
-    "first_order",
-    "geometric_play",
-    "height",
+    "find_contact_pattern",
+    "find_faces_away",
+    "find_largest_residual",
+    "find_round_pairs",
+    "find_schedule_fault",
+    "find_touch_points",
+    "find_touched_contacts",
     "invert",
-    "joint_covariance",
-    "joint_play_mm",
-    "largest",
-    "largest_gap",
-    "measure_mate",
+    "list_outline_points",
+    "list_poses_in_force",
+    "make_measured_model",
+    "measure_contact",
+    "measure_entrance_depth",
+    "measure_face_gap",
+    "measure_height",
+    "measure_largest_gap",
     "measure_round",
-    "measured_rates",
-    "mouth",
-    "observed_residuals",
-    "outline_points",
-    "placements",
-    "play_mm",
-    "poses_in_force",
-    "product",
     "project_observation",
     "project_observations",
     "project_round_faces",
-    "relation_graph",
-    "round_pairs",
-    "schedule_fault",
-    "simplify",
+    "simplify_odl",
     "spell",
-    "touched_contacts",
 )

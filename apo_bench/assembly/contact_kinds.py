@@ -13,7 +13,7 @@ _SAME_SLOPE = 2e-3
 """A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
 
 
-def contact_kind(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
+def classify_contact(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
     """The kind of contact that two faces can make, in either order; None if they can make none."""
     if isinstance(a, Face) and isinstance(b, Face):
         return "plane on plane"
@@ -31,22 +31,22 @@ def contact_kind(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None
     return "cone in cone" if abs(abs(a.slope) - abs(b.slope)) < _SAME_SLOPE else None
 
 
-def geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
+def compute_geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
     """By how much the radius of a hole is larger than that of its shaft, [m]; 0 of every other contact.
 
     Negative where the shaft is thicker than the hole.
     """
-    if isinstance(a, Face) or isinstance(b, Face) or contact_kind(a, b) != "shaft in hole":
+    if isinstance(a, Face) or isinstance(b, Face) or classify_contact(a, b) != "shaft in hole":
         return 0.0
     return a.radius - b.radius if a.hole else b.radius - a.radius
 
 
-def play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
+def compute_play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
     """How far faces that go into one another may be off, [mm]: the clearance if one is fit, and what radii leave.
 
     None of faces that only touch.
     """
     fits = a.fit or b.fit
-    if not fits and contact_kind(a, b) != "shaft in hole":
+    if not fits and classify_contact(a, b) != "shaft in hole":
         return None
-    return clearance_mm * fits + 1e3 * geometric_play(a, b)
+    return clearance_mm * fits + 1e3 * compute_geometric_play(a, b)

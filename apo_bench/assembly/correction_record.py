@@ -11,7 +11,7 @@ from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.plan import Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import require
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 class Iterate(NamedTuple):
@@ -28,7 +28,7 @@ class Iterate(NamedTuple):
     deviations."""
 
 
-class Try(NamedTuple):
+class FreeingTrial(NamedTuple):
     """One trial of the iterative correction of the paper (its Section 4.2): a solution with some poses free."""
 
     step: int
@@ -82,7 +82,7 @@ class Consistency:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One explanation of the observation: what of it is taken as right, how likely that is, and its poses."""
@@ -110,49 +110,54 @@ class Hypothesis:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """What a corrector returns."""
+    """What a corrector returns for an observation of n operations.
+
+    A corrector of your own may return the poses alone: `correct` and `evaluate` wrap them.
+    """
 
     poses: Array
+    """(n, 4, 4): the corrected pose of the main part after each operation, world frame, [m]."""
     status: str
     """`converged`, or one of the endings in `apo_bench.records.outcomes`."""
     sentence: str
+    """The status in words."""
     freed: tuple[int, ...]
     """Operations whose motion parameters were free, counted from 0, most recent first."""
     gap_before_m: float
-    """Largest |e| of a vertex at the observed poses, [m], or the largest violation of an inequality; so is
-    `gap_after_m`, at the corrected ones."""
+    """Largest contact error |e| of a vertex, or largest violation of an inequality, at the observed poses, [m]."""
     gap_after_m: float
+    """The same at the corrected poses, [m]."""
     rank: int
-    """Directions that the equations fix at the poses."""
+    """Number of directions that the contact equations determine at the corrected poses."""
     trace: tuple[Iterate, ...] = ()
-    tried: tuple[Try, ...] = ()
-    """Every set of motion parameters that was tried, in order."""
+    """The iterations of the solver."""
+    tried: tuple[FreeingTrial, ...] = ()
+    """Every set of motion parameters that the iterative correction of the paper tried, in order."""
     schedule: tuple[Step, ...] = ()
-    """What to do and undo, in order; empty stands for: every operation once."""
+    """Operations to do and undo, in order. Default: every operation once."""
     step_poses: Array | None = None
-    """(steps, 4, 4) as in `Plan`; None stands for `poses` throughout."""
+    """(steps, 4, 4), world frame, [m], as in `Plan`; None: those of `poses`."""
     test: Consistency | None = None
-    """Whether the stated noise explains the correction; None of correctors without the test."""
+    """The chi-square test: does the stated noise explain the correction? None for correctors without it."""
     test_after: Consistency | None = None
-    """The test without the contacts that were left out; None if none was."""
+    """The test without the dropped contacts; None if none was dropped."""
     covariance: Array | None = None
-    """(n, 6, 6), of the body twist by which each corrected pose may still be wrong, [m, rad]; None if unknown.
-    Contacts that are walls are not counted, so with walls it is an upper bound. Where there are hypotheses, that of the
-    first and of those whose poses are nearly the same; the others lead elsewhere."""
+    """(n, 6, 6): posterior covariance of each pose, as a twist in the frame of the part, [m, rad]; None if unknown.
+    Inequalities are not counted, so with them it is an upper bound. Of several hypotheses it is that of the first and
+    of those with nearly the same poses."""
     dropped: tuple[str, ...] = ()
-    """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
+    """Relations or single contacts that the corrector dropped: `R3: stick.py on castle1.spy`."""
     left_out: tuple[int, ...] = ()
     """Operations whose observations are all rejected, counted from 0: their poses are inferred."""
     assumed: Observation | None = None
-    """What was corrected in place of the observation, which the posterior is of: without outliers, with further looks;
-    None if it was the observation."""
+    """The observation that was corrected: without outliers, with reobservations. None: the one that was given."""
     hypotheses: tuple[Hypothesis, ...] = ()
-    """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
+    """Explanations of the observation, the most probable first; empty for correctors that consider one only."""
     noise_scale: float = 1.0
-    """How much larger than stated the noise seems to be; `covariance` and `assumed` count it."""
+    """Estimated ratio of the actual noise to the stated noise; `covariance` and `assumed` include it."""
 
     def __post_init__(self) -> None:
         n = len(self.poses)
@@ -160,14 +165,18 @@ class Correction:
 
     @property
     def ok(self) -> bool:
+        """Whether the correction converged and may be executed."""
         return self.status == "converged"
 
     @check_arguments
     def plan(self, observation: Observation) -> Plan:
-        """What the robot is to do after this correction of `observation`.
+        """Return the plan with the corrected poses as targets.
+
+        Args:
+            observation: The observation that was corrected.
 
         Raises:
-            InputError: The correction did not converge, so its poses are not meant to be executed.
+            InputError: The correction did not converge, so its poses must not be executed.
         """
         require(
             self.ok,

@@ -6,18 +6,20 @@ from typing import final
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.poses import Poses, check_parts
 from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The truth of a trial: the consistent poses a seed draws, before any human error."""
+    """The true poses of a trial before any human error; every contact of the scenario holds."""
 
     poses: Array
+    """(n, 4, 4): the target of the main part of each operation, world frame, [m]."""
     start: Poses
+    """Part -> its pose before the first operation, (4, 4), world frame, [m]."""
 
     def __post_init__(self) -> None:
         freeze(self, poses=(None, 4, 4), start=(4, 4))
@@ -25,27 +27,29 @@ class Layout:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """What the human did, without measurement error."""
+    """The true poses of a demonstration of n operations, without measurement error."""
 
     assembly: Assembly
+    """Solids, operations and contacts, without poses."""
     start: Poses
+    """Part -> its pose before the first operation, (4, 4), world frame, [m]."""
     poses: Array
-    """(n, 4, 4): pose of each operation's main part when the hand had let go of it and it rested."""
+    """(n, 4, 4): the pose of the main part of each operation, released and at rest, world frame, [m]."""
     final: Poses
-    """Where every part lay at the end: small late adjustments show here and nowhere else."""
+    """Part -> its pose at the end, (4, 4); late adjustments by the human show only here."""
     human_error_covariance: Array
-    """(n, 6, 6) covariance [m, rad] that the human's carelessness adds, body frame of each main part."""
+    """(n, 6, 6): covariance of the human error, as a twist in the frame of each main part, [m, rad]."""
     code: str = "ok"
     """`ok`, or `demonstration_failed`."""
     why: str = ""
-    """What the judge found wrong, in words."""
+    """The fault that the judge found, in words; empty if there is none."""
     gap_m: float = 1e-4
-    """Largest |e| at which the contact equations count as solved, [m]; what observes it passes it on."""
+    """Largest |e| at which the contact equations count as solved, [m]; observations of it have the same."""
     play_m: float = 0.0
-    """Clearance per side of the parts that fit, [m]; what observes it passes it on."""
+    """Clearance per side of the parts that fit, [m]; observations of it have the same."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)

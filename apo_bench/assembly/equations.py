@@ -20,9 +20,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.pattern import contact_pattern, cross_rows
+from apo_bench.assembly.pattern import cross_rows, find_contact_pattern
 from apo_bench.assembly.poses import Poses
-from apo_bench.assembly.topology import Assembly, product
+from apo_bench.assembly.topology import Assembly, evaluate_odl
 from apo_bench.geometry import Array, pose
 
 
@@ -126,7 +126,7 @@ class Equations:
         return list(accumulate(letters, lambda n, T: np.einsum("mi,mij->mj", n, T), initial=self.plane))
 
 
-def contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
+def build_contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equations:
     """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
 
     Contacts of round faces are those of sheets (`project_round_faces`).
@@ -138,14 +138,14 @@ def contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equatio
     Args:
         poses: (n, 4, 4), where the vertices are taken, world frame, [m].
     """
-    known = contact_pattern(assembly)
+    known = find_contact_pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
     stack = np.concatenate([constants, poses])
     vertex = np.array(known.corners)
     for c in np.flatnonzero(known.laid):
         rows = slice(known.begin[c], known.begin[c + 1])
         # v = (D_a^-1 D_b)^-1 v_a takes corners of a to the frame of b; there v - (n v) n lays them onto the plane of b.
-        corners = pose.apply(pose.inverse(product(known.words[c], stack)), vertex[rows, :3])
+        corners = pose.apply(pose.inverse(evaluate_odl(known.words[c], stack)), vertex[rows, :3])
         n = known.onto[c]
         vertex[rows, :3] = corners - np.outer(corners @ n[:3] + n[3], n[:3])
     return Equations(
@@ -153,11 +153,11 @@ def contact_equations(assembly: Assembly, start: Poses, poses: Array) -> Equatio
     )
 
 
-def largest_gap(assembly: Assembly, start: Poses, poses: Array) -> float:
+def measure_largest_gap(assembly: Assembly, start: Poses, poses: Array) -> float:
     """The largest |e| of all contacts at `poses`, [m]; 0 if there are none."""
-    return largest(contact_equations(assembly, start, poses).residual(poses))
+    return find_largest_residual(build_contact_equations(assembly, start, poses).residual(poses))
 
 
-def largest(e: Array) -> float:
+def find_largest_residual(e: Array) -> float:
     """The largest |e|, 0 of none."""
     return float(np.max(np.abs(e), initial=0.0))

@@ -5,16 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
+from apo_bench.assembly.facing_round import FacingPair, find_round_pairs, measure_round
 from apo_bench.geometry import (
     Array,
     Face,
     RoundFace,
     Solid,
-    across_axis,
-    balls_apart,
-    face_area,
-    overlap,
+    compute_overlap,
+    find_direction_across,
+    measure_ball_distance,
+    measure_face_area,
     pose,
 )
 
@@ -24,7 +24,7 @@ def faces_oppose(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> 
     return bool((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal) < -np.cos(angle_rad))
 
 
-def height(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
+def measure_height(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
     """How far the middle of face a stands in front of the plane of face b, [m]; below 0 behind it."""
     n = T_b[:3, :3] @ b.normal
     return float((pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]) @ n)
@@ -40,7 +40,7 @@ def facing(
     angle_rad: float,
     share: float,
     known: Collection[tuple[str, str]] = (),
-) -> Iterator[Facing]:
+) -> Iterator[FacingPair]:
     """All pairs of faces of two posed solids that might touch.
 
     Args:
@@ -51,7 +51,7 @@ def facing(
         share: Pairs that cover less of the smaller face are left out.
         known: Pairs, by name, that need not be measured again.
     """
-    if balls_apart(a.pieces, T_a, b.pieces, T_b) > gap_m:
+    if measure_ball_distance(a.pieces, T_a, b.pieces, T_b) > gap_m:
         return
     posed_a = _pose_faces(a, T_a)
     posed_b = _pose_faces(b, T_b)
@@ -64,18 +64,18 @@ def facing(
         pair = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
         if pair is not None and abs(pair.gap_m) <= gap_m:
             yield pair
-    for face, other in round_pairs(a, b):
+    for face, other in find_round_pairs(a, b):
         if (face.name, other.name) not in known:
             measured = measure_round(face, T_a, other, T_b)
             if abs(measured.gap_m) <= gap_m and measured.angle_rad <= angle_rad and measured.share >= share:
                 yield measured
 
 
-def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
+def measure_face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
     """From the middle of the overlap, on b, to the plane of a, [m]; from the middle of b where nothing overlaps."""
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
         return measure_round(a, T_a, b, T_b).gap_m
-    common = overlap(a, T_a, b, T_b)
+    common = compute_overlap(a, T_a, b, T_b)
     middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
     return float((T_a[:3, :3] @ a.normal) @ (middle - pose.apply(T_a, a.outline[:1])[0]))
 
@@ -96,14 +96,14 @@ def _pose_faces(solid: Solid, T: Array) -> _Posed:
     return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])
 
 
-def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> Facing | None:
+def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> FacingPair | None:
     """What is measured of face i of one solid and face j of another; None if they cover too little of each other."""
     face_a = a.faces[i]
     face_b = b.faces[j]
     n_a = a.normals[i]
     n_b = b.normals[j]
-    common = overlap(face_a, T_a, face_b, T_b)
-    covered = common.area / min(face_area(face_a), face_area(face_b))
+    common = compute_overlap(face_a, T_a, face_b, T_b)
+    covered = common.area / min(measure_face_area(face_a), measure_face_area(face_b))
     if covered < share or not len(common.corners):
         return None
     middle = common.corners.mean(axis=0)
@@ -117,7 +117,7 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
     slope[1, 3:] = turn_u
     slope[2, 3:] = turn_v
     half = np.ptp((common.corners - middle) @ np.array([u, v]).T, axis=0) / 2
-    return Facing(
+    return FacingPair(
         a=face_a.name,
         b=face_b.name,
         gap_m=float(residual[0]),
@@ -131,5 +131,5 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
 
 def _axes(n: Array, R: Array) -> tuple[Array, Array]:
     """Two unit vectors across n and each other; the first follows the axis of the part that is most across."""
-    u = across_axis(n, R[:, int(np.abs(n @ R).argmin())])
+    u = find_direction_across(n, R[:, int(np.abs(n @ R).argmin())])
     return u, np.array([n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]])

@@ -12,8 +12,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.contact_kinds import contact_kind, geometric_play
-from apo_bench.geometry import Array, Face, RoundFace, Solid, angle_between, mate, pose
+from apo_bench.assembly.contact_kinds import classify_contact, compute_geometric_play
+from apo_bench.geometry import Array, Face, RoundFace, Solid, measure_angle, measure_mate, pose
 
 _TIGHTEST_M = -0.1e-3
 _LOOSEST_M = 0.6e-3
@@ -23,7 +23,7 @@ _SAME_M = 1e-9
 
 @final
 @dataclass(frozen=True, eq=False)
-class Facing:
+class FacingPair:
     """Two faces that look at each other, one of which covers part of the other; of round ones axes count as normals."""
 
     a: str
@@ -50,37 +50,37 @@ class Facing:
 
 
 @lru_cache(maxsize=1024)
-def round_pairs(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
+def find_round_pairs(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
     """The faces of two solids, at least one of them round, whose kinds and sizes can make a contact."""
     every: list[list[Face | RoundFace]] = [[*solid.faces.values(), *solid.rounds.values()] for solid in (a, b)]
     return tuple(
         (face, other)
         for face, other in product(*every)
-        if contact_kind(face, other) not in (None, "plane on plane")
-        and _TIGHTEST_M <= geometric_play(face, other) <= _LOOSEST_M
+        if classify_contact(face, other) not in (None, "plane on plane")
+        and _TIGHTEST_M <= compute_geometric_play(face, other) <= _LOOSEST_M
     )
 
 
-def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Facing:
+def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> FacingPair:
     """Measure two posed faces that can make a contact, of which at least one is round."""
     if isinstance(a, Face) or isinstance(b, Face):
         return _shaft_on_plane(a, T_a, b, T_b)
-    return _in_hole(a, T_a, b, T_b) if contact_kind(a, b) == "shaft in hole" else _cone(a, T_a, b, T_b)
+    return _in_hole(a, T_a, b, T_b) if classify_contact(a, b) == "shaft in hole" else _cone(a, T_a, b, T_b)
 
 
-def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Facing:
+def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> FacingPair:
     (shaft, T_shaft), (flat, T_flat) = ((b, T_b), (a, T_a)) if isinstance(a, Face) else ((a, T_a), (b, T_b))
     assert isinstance(shaft, RoundFace)
     assert isinstance(flat, Face)
     n = T_flat[:3, :3] @ flat.normal
     u = T_shaft[:3, :3] @ shaft.axis
-    touch = mate(shaft, T_shaft, flat, T_flat)
+    touch = measure_mate(shaft, T_shaft, flat, T_flat)
     middle = touch.points.mean(axis=0)
     height = float(touch.off.mean(axis=0) @ n)
     # Of an axis through p along u over a plane n: d(n . p) = n . v + (p x n) . w, and d(n . u) = (u x n) . w.
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
-    return Facing(
+    return FacingPair(
         a=a.name,
         b=b.name,
         residual=np.array([height, n @ u]),
@@ -93,9 +93,9 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     )
 
 
-def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
+def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
     """A cylinder in a cylinder."""
-    touch = mate(a, T_a, b, T_b)
+    touch = measure_mate(a, T_a, b, T_b)
     u = T_a[:3, :3] @ a.axis
     w = T_b[:3, :3] @ b.axis
     u = u if u @ w > 0.0 else -u
@@ -103,7 +103,7 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
     p = touch.points.mean(axis=0)
     off = across @ touch.off.mean(axis=0)
     half = touch.length_m / 2
-    return Facing(
+    return FacingPair(
         a=a.name,
         b=b.name,
         residual=np.array([*off, *(across @ u)]),
@@ -116,7 +116,7 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
     )
 
 
-def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
+def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
     """A cone in a cone, or on a rim, compared where both have one radius."""
     u = T_a[:3, :3] @ a.wider
     w = T_b[:3, :3] @ b.wider
@@ -129,14 +129,14 @@ def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
     tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across
     spans = [abs(float(np.subtract(*face.radii))) for face in (a, b) if face.kind == "cone"]
     common = (high - low) / min(spans) if len(spans) == 2 else float(high >= low - _SAME_M)
-    return Facing(
+    return FacingPair(
         a=a.name,
         b=b.name,
         residual=np.array([*(rows @ (p - q)), *(tilts @ u)]),
         slope=np.array([*_offsets(rows, p), *_tilts(tilts, u)]),
         lengths=3,
         gap_m=float(np.linalg.norm(rows @ (p - q))),
-        angle_rad=angle_between(u, w),
+        angle_rad=measure_angle(u, w),
         share=max(0.0, common),
         half_m=((low + high) / 2,) * len(tilts),
     )

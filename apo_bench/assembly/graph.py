@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly.equations import contact_equations, largest
+from apo_bench.assembly.equations import build_contact_equations, find_largest_residual
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.projection import project_round_faces
-from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, invert, simplify, spell
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, invert, simplify_odl, spell
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 
@@ -72,7 +72,7 @@ class Arc:
     @property
     def operations(self) -> frozenset[int]:
         """The operations whose motion parameters occur in the equations D_a^-1 D_b of this arc (Eq. 26)."""
-        word = simplify((*invert(self.manipulated.odl), *self.environment.odl))
+        word = simplify_odl((*invert(self.manipulated.odl), *self.environment.odl))
         return frozenset(term.operation for term in word)
 
 
@@ -92,7 +92,7 @@ class Graph:
         return not any(other.part == node.part and _time(other) > _time(node) for other in self.nodes)
 
 
-def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
+def build_relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     """The graph after `step` operations (None: all of them).
 
     Nodes are the fixed parts, the parts that were moved, and what arcs hang on.
@@ -116,19 +116,19 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     return Graph(len(done), tuple(nodes), arcs)
 
 
-def arc_residuals(assembly: Assembly, start: Poses, poses: Array, graph: Graph) -> tuple[float, ...]:
+def compute_arc_residuals(assembly: Assembly, start: Poses, poses: Array, graph: Graph) -> tuple[float, ...]:
     """The largest |e| of every arc, [m], at `poses` (n, 4, 4), world frame, [m] (Section 3.3)."""
     done = project_round_faces(assembly.first(graph.step))
     reached = poses[: graph.step]
-    gaps = contact_equations(done, start, reached).gaps(reached)
+    gaps = build_contact_equations(done, start, reached).gaps(reached)
     named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]
     mine = [[made == arc.made and contact in arc.contacts for made, contact in named] for arc in graph.arcs]
-    return tuple(largest(gaps[chosen]) for chosen in mine)
+    return tuple(find_largest_residual(gaps[chosen]) for chosen in mine)
 
 
-def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
+def compute_observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
     """The largest |e| of every arc at the observed poses, [m]; None if it needs an operation that was not observed."""
-    residuals = arc_residuals(observation.assembly, observation.start, observation.poses, graph)
+    residuals = compute_arc_residuals(observation.assembly, observation.start, observation.poses, graph)
     known = [all(observation.observed[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
 

@@ -13,10 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.contact_kinds import contact_kind, play_mm
+from apo_bench.assembly.contact_kinds import classify_contact, compute_play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Array, Face, Laid, Overlap, RoundFace, across_axis, mate, overlaps, pose
+from apo_bench.geometry import (
+    Array,
+    Face,
+    FacePair,
+    Overlap,
+    RoundFace,
+    compute_overlaps,
+    find_direction_across,
+    measure_mate,
+    pose,
+)
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
@@ -43,7 +53,9 @@ class _Touch(NamedTuple):
     """How deep the other face may come at each."""
 
 
-def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float) -> float | None:
+def compute_joint_play_mm(
+    assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float
+) -> float | None:
     """How far apart a corner of a flat fit contact, or the end of a shaft on a plane, can be at most, [mm].
 
     All contacts count that the same operation makes between the same two parts: none of them gets deeper than its own
@@ -68,16 +80,16 @@ def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, 
     return _opening(faces, together.index(contact), T.tobytes(), clearance_mm)
 
 
-def deep_limit_mm(
+def compute_deep_limit_mm(
     assembly: Assembly, contact: Contact, clearance_mm: float, margin_mm: float, touching_mm: float
 ) -> float:
     """How deep faces may be in each other: the play of the pair and a margin, or what faces that should touch may."""
     a, b = map(assembly.face_of, contact)
-    play = play_mm(a, b, clearance_mm)
+    play = compute_play_mm(a, b, clearance_mm)
     return touching_mm if play is None else play + margin_mm
 
 
-def apart_limit_mm(
+def compute_apart_limit_mm(
     assembly: Assembly,
     contact: Contact,
     made: int,
@@ -86,25 +98,25 @@ def apart_limit_mm(
     margin_mm: float,
     touching_mm: float,
 ) -> float:
-    """How far apart faces may be: as deep as in `deep_limit_mm`, or the play of all faces together and a margin, if
-    that is more.
+    """How far apart faces may be: as deep as in `compute_deep_limit_mm`, or the play of all faces together and a
+    margin, if that is more.
 
     Args:
-        made: As in `joint_play_mm`, and so is `true`.
+        made: As in `compute_joint_play_mm`, and so is `true`.
         margin_mm: What is allowed beyond the play.
         touching_mm: What faces that should touch may be off.
     """
-    deep = deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
-    play = joint_play_mm(assembly, contact, made, true, clearance_mm)
+    deep = compute_deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
+    play = compute_joint_play_mm(assembly, contact, made, true, clearance_mm)
     return deep if play is None else max(deep, play + margin_mm)
 
 
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
-    """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones."""
-    if not {contact_kind(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
+    """The largest gap of one of some pairs of faces, [mm]; kept, since all trials of a seed share the true ones."""
+    if not {classify_contact(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
-    if contact_kind(*faces[which]) == "shaft in hole":
+    if classify_contact(*faces[which]) == "shaft in hole":
         return None
     rows, limits, owners = _touch_rows(faces, at, clearance_mm)
     widest = _widest(rows[owners == which], rows, limits)
@@ -120,9 +132,9 @@ def _touch_rows(
     Also how deep each point may come, (k,), [mm], and the pair that it belongs to, (k,).
     """
     T = np.frombuffer(at).reshape(4, 4)
-    # Flat faces are measured in one call.
-    flat = iter(overlaps([Laid(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]))
-    touches = [_touch(a, b, T, clearance_mm, flat) for a, b in faces]
+    flat = [FacePair(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]
+    common = iter(compute_overlaps(flat))
+    touches = [_touch(a, b, T, clearance_mm, common) for a, b in faces]
     owners = np.repeat(np.arange(len(touches)), [len(touch.points) for touch in touches])
     points = np.concatenate([touch.points for touch in touches])
     normals = np.concatenate([touch.normals for touch in touches])
@@ -156,26 +168,26 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
     return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
 
 
-def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, flat: Iterator[Overlap]) -> _Touch:
+def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, common: Iterator[Overlap]) -> _Touch:
     """Where two faces touch.
 
     Args:
         T: The pose of the part that moves in the frame of the one that rests.
-        flat: Gives the overlap, if both are flat.
+        common: Gives the overlap, if both are flat.
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):
-        points = next(flat).corners
+        points = next(common).corners
         return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
-    between = mate(moved, T, rests, np.eye(4))
+    between = measure_mate(moved, T, rests, np.eye(4))
     if isinstance(rests, Face):
         return _Touch(between.points, np.tile(rests.normal, (2, 1)), fit_mm)
     if isinstance(moved, Face):
         return _Touch(between.points, np.tile(-T[:3, :3] @ moved.normal, (2, 1)), fit_mm)
-    x = across_axis(between.axis)
+    x = find_direction_across(between.axis)
     turns = 2.0 * np.pi * (np.arange(_WALLS) + 0.5) / _WALLS
     ring = np.outer(np.cos(turns), x) + np.outer(np.sin(turns), np.cross(between.axis, x))
-    play = play_mm(moved, rests, clearance_mm) or 0.0
+    play = compute_play_mm(moved, rests, clearance_mm) or 0.0
     ends = between.points
     # Walls at r cos(pi / N) from the axis make a polygon whose corners lie on the circle of radius r.
     return _Touch(np.repeat(ends, _WALLS, axis=0), np.tile(ring, (len(ends), 1)), max(0.0, play) * cos(pi / _WALLS))

@@ -5,9 +5,9 @@ from typing import final
 
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Laid, Mate, Overlap, mate, overlaps
+from apo_bench.geometry import FacePair, Mate, Overlap, compute_overlaps, measure_mate
 
-Lie = Mate | Overlap
+Meeting = Mate | Overlap
 """How two faces lie to each other of which one is round, or the overlap of two flat ones."""
 
 
@@ -17,9 +17,9 @@ class Meetings:
 
     def __init__(self, assembly: Assembly) -> None:
         self.assembly = assembly
-        self._found = dict[tuple[Contact, bytes, bytes], Lie]()
+        self._found = dict[tuple[Contact, bytes, bytes], Meeting]()
 
-    def lies(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Lie]:
+    def measure(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Meeting]:
         """Measure contacts; flat ones all in one call.
 
         Args:
@@ -33,20 +33,20 @@ class Meetings:
         fresh = {key: pair for key, pair in zip(keys, pairs, strict=True) if key not in self._found}
         flat = {key: pair for key, pair in fresh.items() if not self.assembly.is_round(pair[0])}
         if flat:
-            self._found.update(zip(flat, overlaps([self._laid(*pair) for pair in flat.values()]), strict=True))
-        self._found.update({key: measure_mate(self.assembly, *fresh[key]) for key in fresh.keys() - flat.keys()})
+            self._found.update(zip(flat, compute_overlaps([self._laid(*pair) for pair in flat.values()]), strict=True))
+        self._found.update({key: measure_contact(self.assembly, *fresh[key]) for key in fresh.keys() - flat.keys()})
         return [self._found[key] for key in keys]
 
-    def overlaps(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Overlap]:
-        """What the faces of contacts have in common, as in `lies`; nothing, if they do not look at each other."""
-        return [lie.common if isinstance(lie, Mate) else lie for lie in self.lies(contacts)]
+    def measure_overlaps(self, contacts: Iterable[tuple[Contact, Poses]]) -> list[Overlap]:
+        """What the faces of contacts have in common, as in `measure`; nothing, if they do not look at each other."""
+        return [lie.common if isinstance(lie, Mate) else lie for lie in self.measure(contacts)]
 
-    def _laid(self, contact: Contact, poses: Poses) -> Laid:
+    def _laid(self, contact: Contact, poses: Poses) -> FacePair:
         m, e = contact
-        return Laid(self.assembly.face(m), poses[m.part], self.assembly.face(e), poses[e.part])
+        return FacePair(self.assembly.face(m), poses[m.part], self.assembly.face(e), poses[e.part])
 
 
-def measure_mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
+def measure_contact(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
     """How the faces of a contact lie to each other of which one is round."""
     m, e = contact
-    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+    return measure_mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])

@@ -14,34 +14,36 @@ from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import ArgumentError, require
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What was observed: all a corrector may use."""
+    """What was observed of a demonstration of n operations: all that a corrector may use."""
 
     assembly: Assembly
+    """Solids, operations and contacts, without poses."""
     start: Poses
+    """Part -> its pose before the first operation, (4, 4), world frame, [m]."""
     poses: Array
-    """(n, 4, 4)."""
+    """(n, 4, 4): the observed pose of the main part after each operation, world frame, [m]."""
     covariance: Array
-    """(n, 6, 6), of the body twist by which each pose is wrong, [m, rad]."""
+    """(n, 6, 6), of the error of each pose as a twist in the frame of the part, [m, rad]."""
     observed: NDArray[np.bool_]
-    """(n,): whether the operation was observed at all."""
+    """(n,): whether the operation was observed; the pose of an operation that was not is ignored."""
     gap_m: float = 1e-4
     """Largest |e| at which the contact equations count as solved, [m]."""
     play_m: float = 0.0
-    """How far from nominal a contact of parts that fit may really be: their clearance per side, [m]."""
+    """Clearance per side of parts that fit, [m]: how far a contact may be from nominal."""
     outliers: OutlierModel | None = None
-    """How often observations of this kind are worse than they say; None if that is not known."""
+    """How often errors are larger than `covariance` states; None if that is unknown."""
     shared: tuple[SharedError, ...] = ()
-    """What errors of operations have in common, all of it within `covariance`; none: they are independent."""
+    """The part of the errors that operations have in common, included in `covariance`; empty: independent errors."""
     tails: Tails | None = None
-    """How errors are distributed; None: as a Gaussian's."""
+    """The distribution of the errors; None: Gaussian."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
@@ -62,7 +64,7 @@ class Observation:
         object.__setattr__(self, "observed", observed)
 
     def plan(self) -> Plan:
-        """What was observed, as it is: the plan of the method `uncorrected`.
+        """Return the plan of the method `uncorrected`: the observed poses as targets.
 
         Raises:
             InputError: An operation was not observed.

@@ -60,7 +60,9 @@ class OutlierModel:
         return -2.0 * float(np.log(self.relation / (1.0 - self.relation)))
 
 
-def measured_rates(gross: float, broad: float = OutlierModel.broad, times: float = OutlierModel.times) -> OutlierModel:
+def make_measured_model(
+    gross: float, broad: float = OutlierModel.broad, times: float = OutlierModel.times
+) -> OutlierModel:
     """A model with rates that were measured, kept away from 0 and 1, which no number of measurements proves."""
     gross, broad = (float(np.clip(rate, _LEAST_RATE, 0.49)) for rate in (gross, broad))
     return OutlierModel(gross, broad, times)

@@ -1,7 +1,7 @@
 """What the contact equations of an assembly have in common, wherever its parts are; and which faces look away.
 
 The equations say that vertices of one face lie in the plane of the other, whichever way the two look: a cube upside
-down inside the table satisfies them as well as one that stands on it. So this is asked apart (`faces_away`). Nothing
+down inside the table satisfies them as well as one that stands on it. So `find_faces_away` tests this. Nothing
 keeps a cone on a rim from tilting, so it may by up to a right angle; planes through an axis have no sense.
 """
 
@@ -12,11 +12,11 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.contact_kinds import OPPOSING, contact_kind
+from apo_bench.assembly.contact_kinds import OPPOSING, classify_contact
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.projection import project_round_faces
-from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, invert, simplify
-from apo_bench.geometry import Array, Face, remembered
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, invert, simplify_odl
+from apo_bench.geometry import Array, Face, remember
 
 _MOST_CORNERS = 8
 """Of an outline with more, such as a circle, those farthest out in so many directions say as much."""
@@ -50,11 +50,11 @@ class Pattern:
     """(c,): the largest cosine between normals of faces that look at each other; infinite of planes through an axis."""
 
 
-@remembered
-def contact_pattern(assembly: Assembly) -> Pattern:
+@remember
+def find_contact_pattern(assembly: Assembly) -> Pattern:
     """What the equations of an assembly have in common; its contacts are those of `project_round_faces(assembly)`."""
     if (low := project_round_faces(assembly)) is not assembly:
-        return contact_pattern(low)
+        return find_contact_pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
     c = len(chosen)
@@ -89,19 +89,20 @@ def _opposing(assembly: Assembly, contact: Contact) -> float:
     if not assembly.face(contact.manipulated).opposes:
         return math.inf
     tilts = (
-        contact in assembly.origin and contact_kind(*map(assembly.face_of, assembly.origin[contact])) == "cone on rim"
+        contact in assembly.origin
+        and classify_contact(*map(assembly.face_of, assembly.origin[contact])) == "cone on rim"
     )
     return 0.0 if tilts else OPPOSING
 
 
-def faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[np.bool_]:
+def find_faces_away(assembly: Assembly, start: Poses, poses: Array) -> NDArray[np.bool_]:
     """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
     `relations()`; those of round faces as `project_round_faces` has them.
 
     Args:
         poses: (*, n, 4, 4), world frame, [m].
     """
-    known = contact_pattern(assembly)
+    known = find_contact_pattern(assembly)
     constant = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)[:, :3, :3]
     lead = poses.shape[:-3]
     R = np.concatenate(
@@ -128,7 +129,7 @@ def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, in
     """
     rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
     return [
-        (contact, k - len(parts), simplify((*invert(D[contact.manipulated.part]), *D[contact.environment.part])))
+        (contact, k - len(parts), simplify_odl((*invert(D[contact.manipulated.part]), *D[contact.environment.part])))
         for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
         for contact in operation.contacts
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.poses import Poses, check_parts
 from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
 
@@ -23,20 +23,22 @@ class Step(NamedTuple):
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What the robot is asked to do."""
+    """The target poses of n operations, and the order in which the robot does and undoes them."""
 
     assembly: Assembly
+    """Solids, operations and contacts, without poses."""
     start: Poses
+    """Part -> its pose before the first operation, (4, 4), world frame, [m]."""
     target_poses: Array
-    """(n, 4, 4): where every operation puts its main part in the end."""
+    """(n, 4, 4): the final pose of the main part of each operation, world frame, [m]."""
     schedule: tuple[Step, ...] = field(default=())
-    """Empty stands for: every operation once, in order."""
+    """Operations to do or undo, in order. Default: every operation once."""
     step_poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
-    """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
-    that it undoes. Empty stands for: those of `target_poses`."""
+    """(steps, 4, 4): the target of each step of the schedule, world frame, [m]; of an undo step, the target that it
+    undoes. Default: those of `target_poses`."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
@@ -50,7 +52,7 @@ class Plan:
 
     @check_arguments
     def with_target_poses(self, poses: Array) -> "Plan":
-        """The plan with other target poses, (n, 4, 4), also in the steps that bring parts to the old ones."""
+        """Return the plan with other target poses, (n, 4, 4), world frame, [m]; steps to the old ones lead to them."""
         done = [step.operation for step in self.schedule]
         # step poses that are not target poses are states in between, which stay where they are
         final = (self.step_poses == self.target_poses[done]).all(axis=(1, 2))
@@ -59,7 +61,7 @@ class Plan:
         )
 
 
-def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
+def find_schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
 
     What is done is always the first few operations: an operation may stand on all that came before it, and what was
@@ -80,7 +82,7 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     return f"leaves operation {done + 1} undone" if done < operations else ""
 
 
-def poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
+def list_poses_in_force(plan: Plan) -> list[tuple[int, Array]]:
     """How many operations are done, and the poses in force, before each time something is undone and at the end."""
     poses = np.array(plan.target_poses)
     done = 0

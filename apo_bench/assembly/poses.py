@@ -11,7 +11,7 @@ Poses = Mapping[str, Array]
 """Part name -> pose (4, 4) in the world, [m]."""
 
 
-def placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[Poses, ...]:
+def compute_placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[Poses, ...]:
     """The pose of every part after each operation, what an ODL stands for (Section 3.2.1), by walking the operations.
 
     Args:

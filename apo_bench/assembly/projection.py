@@ -22,11 +22,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.contact_kinds import WALLS, contact_kind
+from apo_bench.assembly.contact_kinds import WALLS, classify_contact
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import require
-from apo_bench.geometry import Array, Face, RoundFace, remembered
+from apo_bench.geometry import Array, Face, RoundFace, remember
 
 _BEHIND = "|"
 """Between the name of a face and what a sheet adds to it: no name of a face has it."""
@@ -56,7 +56,7 @@ def project_observations(observations: Sequence[Observation]) -> Sequence[Observ
     return observations if alike else [project_observation(one) for one in observations]
 
 
-@remembered
+@remember
 def _project(assembly: Assembly) -> Assembly | None:
     """None of an assembly without round contacts: what is remembered of an object must not keep it alive."""
     if not any(assembly.is_round(contact) for operation in assembly.operations for contact in operation.contacts):
@@ -83,7 +83,7 @@ class _Sheets:
         """The contacts that one stands for."""
         if not self._assembly.is_round(contact):
             return [contact]
-        kind = contact_kind(*map(self._assembly.face_of, contact))
+        kind = classify_contact(*map(self._assembly.face_of, contact))
         gap = self._assembly.gaps.get(contact, Gap())
         _check_gap(contact, kind, gap)
         if kind == "shaft on plane":

@@ -6,11 +6,11 @@ from typing import final
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.plan import Step
 from apo_bench.assembly.poses import Poses
-from apo_bench.geometry import copyable, freeze
+from apo_bench.geometry import freeze, make_copyable
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """The physical state when an operation was over, or at the end."""
@@ -50,7 +50,7 @@ class Outcome:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Reached:
+class ReachedState:
     """What the judge looks at: nothing but physics."""
 
     after: tuple[Snapshot | None, ...]
@@ -61,7 +61,7 @@ class Reached:
 
 @final
 @dataclass(frozen=True)
-class InHand:
+class SlipInHand:
     """How far a part moved in the hand since it was grasped: flat pads hold a shaft along two lines only.
 
     A length is that of the point between the pads, an angle any turn: rolling between them and turning about them.
@@ -98,17 +98,20 @@ class ProbingResult:
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class ReplayResult:
-    """One replay: what was reached and how it went."""
+    """What a replay reached, and how it ended."""
 
-    reached: Reached
+    reached: ReachedState
+    """The poses and states of the parts after each operation and at the end, for the judge."""
     outcome: Outcome
+    """Stage, code, operation and sentence of the end, as the robot knows it."""
     peak_force_n: float
     """Largest net contact force on a part that the robot held (the gripper's own forces excluded), behind a low-pass
     filter of 20 ms, [N]."""
     sim_time_s: float
+    """Simulated time, [s]."""
     timeline: tuple[tuple[Step, float], ...] = ()
-    """Each step that was finished, with the simulated time at which it was over, [s]."""
-    in_hand: tuple[InHand, ...] = ()
-    """Of each operation whose part was grasped; no controller reads it."""
+    """Each finished step of the schedule with the simulated time of its end, [s]."""
+    in_hand: tuple[SlipInHand, ...] = ()
+    """How far each grasped part slipped in the gripper; the controller does not know it."""
     probing: ProbingResult | None = None
-    """None of a robot that does not feel."""
+    """The estimate of the calibration error; None without probing."""

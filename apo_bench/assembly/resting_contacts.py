@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.contact_kinds import contact_kind
+from apo_bench.assembly.contact_kinds import classify_contact
 from apo_bench.assembly.meeting import Meetings
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
@@ -19,7 +19,7 @@ from apo_bench.geometry import (
     Array,
     Face,
     RoundFace,
-    across_axis,
+    find_direction_across,
     pose,
 )
 
@@ -39,7 +39,7 @@ class TouchedContact(NamedTuple):
     """Where round faces touch so, (k, 3), world, [m]; None of flat ones, which touch where they overlap."""
 
 
-def touched_contacts(
+def find_touched_contacts(
     assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
 ) -> list[TouchedContact]:
     """The contacts between a part that moves and a part that rests, round ones once for each normal."""
@@ -52,7 +52,7 @@ def touched_contacts(
     return touches
 
 
-def corners(
+def find_touch_points(
     assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: Meetings | None = None
 ) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
@@ -62,14 +62,16 @@ def corners(
         known: What is measured already.
     """
     every = list(touched)
-    flat = iter((known or Meetings(assembly)).overlaps((each.contact, poses) for each in every if each.points is None))
+    flat = iter(
+        (known or Meetings(assembly)).measure_overlaps((each.contact, poses) for each in every if each.points is None)
+    )
     points = [next(flat).corners if each.points is None else each.points for each in every]
     normals = [np.tile(each.normal, (len(at), 1)) for each, at in zip(every, points, strict=True)]
     nothing = np.zeros((0, 3))
     return np.concatenate([nothing, *points]), np.concatenate([nothing, *normals])
 
 
-def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
+def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     """Points that a face reaches to, (k, 3), world, [m]: its corners, or rings at both ends of a round one."""
     face = assembly.face_of(of)
     T = poses[of.part]
@@ -79,9 +81,9 @@ def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     return pose.apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
 
-def mouth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
+def measure_entrance_depth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
     """How far before its place on a way a face comes to where another one begins, [m]."""
-    ahead, before = (outline_points(assembly, of, poses) @ way for of in (moved, rests))
+    ahead, before = (list_outline_points(assembly, of, poses) @ way for of in (moved, rests))
     return float(ahead.max() - before.min())
 
 
@@ -108,7 +110,7 @@ def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses:
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
     """The normals of two round faces, and where each acts: off the wall at both ends of what the faces have in common,
     and, where cones meet or a rim, out along the axis."""
-    kind = contact_kind(still, moved)
+    kind = classify_contact(still, moved)
     out = -1.0 if still.hole else 1.0
     axis = T[:3, :3] @ still.axis
     at = pose.apply(T, still.ends)
@@ -130,7 +132,7 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
     face, T = min((still, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
     if face.extent_rad >= WHOLE_TURN - 1e-9:
         z = T[:3, :3] @ face.axis
-        x = across_axis(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
+        x = find_direction_across(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
         y = np.cross(z, x)
         yield from (x, -x, y, -y)
         return

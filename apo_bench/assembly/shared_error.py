@@ -14,11 +14,11 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, copyable, freeze, pose
+from apo_bench.geometry import Array, freeze, make_copyable, pose
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class SharedError:
     """A part of the errors of some operations that is the same in all of them, or correlated."""
@@ -61,7 +61,7 @@ class SharedError:
         return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
 
 
-def joint_covariance(poses: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
+def compute_joint_covariance(poses: Array, covariance: Array, shared: Sequence[SharedError]) -> Array:
     """The covariance of the body twists of all operations together, (6 n, 6 n), [m, rad].
 
     Args:
@@ -84,7 +84,7 @@ def joint_covariance(poses: Array, covariance: Array, shared: Sequence[SharedErr
     return np.asarray((whole + whole.T) / 2)
 
 
-def first_order(m: int, correlation: float) -> Array:
+def correlate_first_order(m: int, correlation: float) -> Array:
     """The correlations of a first-order autoregression, (m, m)."""
     steps = np.arange(m)
     return np.asarray(correlation ** np.abs(steps[:, None] - steps))

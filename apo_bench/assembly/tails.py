@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 _COLUMNS = ((0, 1), (2,), (3, 4), (5,))
 """Of an error (x, y, along; rx, ry, about): across, along, tilt, turn about."""
@@ -19,7 +19,7 @@ _SEED = 20
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Tails:
     """How the errors of n operations are distributed; numbers in the order across, along, tilt, turn about."""

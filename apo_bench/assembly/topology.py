@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly.contact_kinds import WALLS, contact_kind, geometric_play
-from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
+from apo_bench.assembly.contact_kinds import WALLS, classify_contact, compute_geometric_play
+from apo_bench.geometry import Array, Face, RoundFace, Solid, copy_frozen, freeze, make_copyable, pose, remember
 
 
 class PartFace(NamedTuple):
@@ -105,21 +105,32 @@ class Relation(NamedTuple):
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What is taken as certain: solids, operations, fixed parts. It never changes."""
+    """What is certain about a task: solids, operations and their contacts, fixed parts. It has no poses.
+
+    Examples:
+        >>> import apo_bench
+        >>> assembly = apo_bench.load_scenario("stick_in_tower").assembly
+        >>> len(assembly), [operation.main for operation in assembly.operations]
+        (3, ['castle1', 'castle2', 'stick'])
+        >>> print(assembly.operations[2].contacts[0])
+        stick.nz on castle1.sfl
+    """
 
     solids: Mapping[str, Solid]
+    """Part -> its nominal shape, part frame, [m]."""
     operations: tuple[Operation, ...]
+    """For each operation the part that moves, the contacts that it makes, and the parts that it carries."""
     fixed: frozenset[str]
-    """Stable objects (Section 2.3): parts that no operation moves, such as the table."""
+    """Parts that no operation moves, such as the table (stable objects, Section 2.3 of the paper)."""
     gaps: Mapping[Contact, Gap] = field(default_factory=dict)
-    """Contacts that are not simply asked to coincide."""
+    """Contact -> how far apart its faces are; a contact that is not named has faces that coincide."""
     sheets: Mapping[PartFace, Face] = field(default_factory=dict)
-    """Planes and points that stand for round faces, which no part has: `lowering` makes them."""
+    """Planes and points that stand for round faces in the contact equations."""
     origin: Mapping[Contact, Contact] = field(default_factory=dict)
-    """Contacts of sheets -> the contact of a round face that they are part of."""
+    """Contact of a sheet -> the contact of the round face that it stands for."""
 
     def __post_init__(self) -> None:
         freeze(self, solids=None, gaps=None, sheets=None, origin=None)
@@ -164,7 +175,7 @@ class Assembly:
         if contact in self.origin and self.face(contact.manipulated).opposes:
             slope = max(abs(face.slope) for face in (a, b) if isinstance(face, RoundFace))
             return fits * math.hypot(1.0, slope) / slope
-        return max(0.0, fits + geometric_play(a, b))
+        return max(0.0, fits + compute_geometric_play(a, b))
 
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
         """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play.
@@ -174,15 +185,21 @@ class Assembly:
         gap = self.gaps.get(contact, Gap())
         low, high = gap.interval(self.play(contact, play_m))
         whole = self.given(contact)
-        if gap.kind == "clearance" and whole != contact and contact_kind(*map(self.face_of, whole)) == "shaft in hole":
+        if (
+            gap.kind == "clearance"
+            and whole != contact
+            and classify_contact(*map(self.face_of, whole)) == "shaft in hole"
+        ):
             inside = math.cos(math.pi / (2 * WALLS))
             return low * inside, high * inside
         return low, high
 
-    @remembered
+    @remember
     def intervals(self, play_m: float) -> Array:
         """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
-        return frozen(np.reshape([self.interval(relation.contact, play_m) for relation in self.relations()], (-1, 2)))
+        return copy_frozen(
+            np.reshape([self.interval(relation.contact, play_m) for relation in self.relations()], (-1, 2))
+        )
 
     def first(self, n: int) -> "Assembly":
         """What is known after n operations: the same parts, no later operation."""
@@ -201,11 +218,11 @@ class Assembly:
         for k, operation in enumerate(self.operations):
             before = current.get(operation.main, ())
             for part in operation.carries:
-                current[part] = simplify((Term(k), *invert(before), *current.get(part, ())))
+                current[part] = simplify_odl((Term(k), *invert(before), *current.get(part, ())))
             current[operation.main] = (Term(k),)
             yield current
 
-    @remembered
+    @remember
     def relations(self) -> tuple[Relation, ...]:
         """Every contact ever made, in the order of the operations."""
         moved: dict[str, list[int]] = {}
@@ -218,7 +235,7 @@ class Assembly:
             for contact in operation.contacts
         )
 
-    @remembered
+    @remember
     def arcs(self) -> tuple[tuple[int, ...], ...]:
         """The contacts of R1, R2, ..: all that one operation makes between one pair of parts (Section 3.1).
 
@@ -256,7 +273,7 @@ def invert(odl: Iterable[Term]) -> ODL:
     return tuple(Term(k, not inverse) for k, inverse in reversed(tuple(odl)))
 
 
-def simplify(odl: Sequence[Term]) -> ODL:
+def simplify_odl(odl: Sequence[Term]) -> ODL:
     """An ODL without neighbours that cancel, such as T2 T2^-1."""
     out: list[Term] = []
     for term in odl:
@@ -272,6 +289,6 @@ def spell(odl: Iterable[Term]) -> str:
     return " ".join(f"T{k + 1}{'^-1' if inverse else ''}" for k, inverse in odl) or "I"
 
 
-def product(odl: Iterable[Term], poses: Array) -> Array:
+def evaluate_odl(odl: Iterable[Term], poses: Array) -> Array:
     """The pose an ODL stands for, given the motion parameters `poses` (n, 4, 4) -> (4, 4)."""
     return reduce(np.matmul, (pose.inverse(poses[k]) if inverse else poses[k] for k, inverse in odl), np.eye(4))

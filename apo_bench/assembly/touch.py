@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
-from apo_bench.geometry import FARTHEST_M, Array, copyable, freeze, frozen, is_rigid
+from apo_bench.geometry import FARTHEST_M, Array, copy_frozen, freeze, is_rigid, make_copyable
 
 SMALLEST_SIGMA_M = 1e-9
 """No touch measures a place more exactly; rounding would no longer be small against it."""
@@ -17,7 +17,7 @@ _NOT_UNIT = 1e-6
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Touch:
     """n . (X h v) = d: X is where the tip really is, h how the part lies in the hand, v the point."""
@@ -68,6 +68,6 @@ def checked_pose(name: str, value: Any) -> Array:
     Raises:
         InputError: It is none.
     """
-    T = frozen(value, 4, 4)
+    T = copy_frozen(value, 4, 4)
     require(is_rigid(T[None])[0], f"the {name} was given as a matrix that is no rigid pose; give a turn and a shift.")
     return T

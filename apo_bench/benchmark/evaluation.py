@@ -12,7 +12,7 @@ from apo_bench.benchmark.sweeps.sweep import run_sweep
 from apo_bench.errors import require, require_known, shown
 from apo_bench.names import SESSION
 from apo_bench.records import METHODS, TrialConfig, TrialRecord
-from apo_bench.scenario import Scenario, is_named, scenario_path
+from apo_bench.scenario import Scenario, find_scenario_path, is_named
 
 Method = str | Callable[..., Any]
 """A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)` poses."""
@@ -44,11 +44,24 @@ def evaluate(
             scenario may be a `Scenario`, and `noise` a function.
 
     Returns:
-        A table with the success rate of each condition.
+        A table with the success rate and its 95 % interval in each condition.
 
     Raises:
         InputError: An unknown setting, a value that is not allowed, or a function with more than one worker that cannot
             be imported.
+
+    Examples:
+        >>> import apo_bench, numpy as np
+        >>> def replay_as_observed(observation):
+        ...     return np.array(observation.poses)  # (n, 4, 4), world frame, [m]
+        >>> table = apo_bench.evaluate(
+        ...     {"mine": replay_as_observed, "contact": "contact"},
+        ...     scenario="block_on_block",
+        ...     seeds=1,
+        ...     fidelity="near-contact",
+        ... )
+        >>> [(row["method"], row["trials"]) for row in table.rows]
+        [('contact', 1), ('mine', 1)]
     """
     for name in settings:
         require_known("setting", name, (*_AXES, *SHARED, "noise_mm", "noise_deg", "seed"))
@@ -92,7 +105,7 @@ def _scenario_source(scenario: str | Path | Scenario) -> str:
         scenario.source is not None,
         f"the scenario '{scenario.name}' was given, which was not read from a file; give its file.",
     )
-    shipped = is_named(scenario.name) and scenario_path(scenario.name) == scenario.source
+    shipped = is_named(scenario.name) and find_scenario_path(scenario.name) == scenario.source
     return scenario.name if shipped else str(scenario.source)
 
 

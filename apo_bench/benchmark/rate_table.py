@@ -30,7 +30,7 @@ class RateTable:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One dict for each condition: its settings, `trials`, `successes`, `rate`, `low_95`, `high_95` and more."""
+        """One dict for each condition: settings, `trials`, `successes`, `rate`, `low_95`, `high_95` (from 0 to 1)."""
         table = self._table()
         named = [column for column in table.columns if column.name]
         return [{column.name: column.of(item) for column in named} for item in table.items]
@@ -42,7 +42,7 @@ class RateTable:
         return "\n".join(_align([[column.head for column in table.shown], *table.lines], words))
 
     def to_pandas(self) -> Any:
-        """The rows as a `pandas.DataFrame`.
+        """Return the rows as a `pandas.DataFrame`.
 
         Raises:
             InputError: The package pandas is not installed.
@@ -54,7 +54,7 @@ class RateTable:
         return pandas.DataFrame(self.rows)
 
     def to_polars(self) -> Any:
-        """The rows as a `polars.DataFrame`.
+        """Return the rows as a `polars.DataFrame`.
 
         Raises:
             InputError: The package polars is not installed.
@@ -71,13 +71,13 @@ class RateTable:
         Raises:
             InputError: Another ending, or the file cannot be written.
         """
-        from apo_bench.benchmark.analysis import settings, tally
+        from apo_bench.benchmark.analysis import list_settings, tally
         from apo_bench.benchmark.report.figures.figures import figures
 
         target = Path(path)
         require(target.suffix in (".svg", ".png"), f"'{path}' was given; use a file name that ends in .svg or .png.")
         cells = tally(self.records)
-        drawn = figures(cells, (), settings(cells), (), (), (), ())
+        drawn = figures(cells, (), list_settings(cells), (), (), (), ())
         return drawn["success_over_noise_level"].write(target)
 
     def save(self, folder: str | Path) -> Path:

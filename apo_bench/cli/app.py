@@ -21,11 +21,11 @@ from apo_bench.cli.leaderboard import leaderboard_command
 from apo_bench.cli.report import report_command
 from apo_bench.cli.run import run_command
 from apo_bench.cli.score import score_command
-from apo_bench.cli.shared import NO_RESULT, Command, Group, Interrupted
+from apo_bench.cli.shared import NO_RESULT, Command, Group, Interruption
 from apo_bench.cli.sweep import sweep_command
 from apo_bench.cli.view import view_command
 from apo_bench.errors import InputError
-from apo_bench.io import brief, clean, streams
+from apo_bench.io import clean, shorten_text, streams
 from apo_bench.names import own_modules_in
 
 WRONG_REQUEST = 2
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         streams.finish()
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
-    except (Interrupted, KeyboardInterrupt) as error:
+    except (Interruption, KeyboardInterrupt) as error:
         return _complain(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
     except (RuntimeError, streams.Unusable) as error:
         return _complain(str(error), NO_RESULT)
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _complain(sentence: str, code: int) -> int:
     with suppress(OSError):
-        typer.echo(f"apo-bench: {brief(clean(sentence))}", err=True)
+        typer.echo(f"apo-bench: {shorten_text(clean(sentence))}", err=True)
     return code
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import Command, check_output, group, path_option, print_columns, print_written
+from apo_bench.cli.shared import Command, check_output, make_group, make_path_option, print_columns, print_written
 
 _HELP = """
 Robot arms.
@@ -14,7 +14,7 @@ Examples:
   apo-bench arm list
   apo-bench arm check ur5e_primitive peg_in_hole --layouts 3
 """
-commands = group("arm", _HELP)
+commands = make_group("arm", _HELP)
 
 
 @commands.command("list", cls=Command)
@@ -39,7 +39,7 @@ def arm_check(
     ],
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario by name or file.")] = "stick_in_tower",
     layouts: Annotated[int, typer.Option(min=1, max=1000, help="Number of layouts to check.")] = 20,
-    out: Annotated[Path | None, path_option("Draw the arm at the table into this file: .png.")] = None,
+    out: Annotated[Path | None, make_path_option("Draw the arm at the table into this file: .png.")] = None,
 ) -> None:
     """Measure what an arm can do at the table: reach, errors of its tip, stiffness, gripper, joint limits.
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from apo_bench.cli.scenario import ClearanceMm, Fixed, MaxOverlapMm, Order, Overwrite, Up, write_new_scenario
-from apo_bench.cli.shared import Command, check_output, group, parse_path, path_option
+from apo_bench.cli.shared import Command, check_output, make_group, make_path_option, parse_path
 
 _HELP = """
 Assemblies from CAD files.
@@ -15,7 +15,7 @@ Examples:
   apo-bench assembly import jig.step --out jig.toml
   apo-bench assembly import jig.stl --unit mm --out jig.toml
 """
-commands = group("assembly", _HELP)
+commands = make_group("assembly", _HELP)
 
 
 @commands.command("import", cls=Command)
@@ -27,7 +27,7 @@ def assembly_import(
         ),
     ],
     *,
-    out: Annotated[Path, path_option("Write the scenario: .toml; its parts are in a folder next to it.")],
+    out: Annotated[Path, make_path_option("Write the scenario: .toml; its parts are in a folder next to it.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the files: mm, in, m, cm, ft or um; default: as they state.")
     ] = None,
@@ -44,10 +44,10 @@ def assembly_import(
       apo-bench assembly import jig.step --out jig.toml
       apo-bench assembly import base.step key.step pin.step --order key,pin --out clamp.toml
     """
-    from apo_bench.importers.assembly.from_cad import import_assembly
+    from apo_bench.importers.assembly.from_cad import import_parts
 
     check_output(out, "--out", ".toml", new=not overwrite)
-    poses, lines = import_assembly(files, out.with_name(f"{out.stem}_parts"), unit)
+    poses, lines = import_parts(files, out.with_name(f"{out.stem}_parts"), unit)
     typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
     source = ", ".join(file.name for file in files)
     write_new_scenario(poses, [], source, out, (up, fixed, order, clearance_mm, max_overlap_mm))

@@ -5,16 +5,16 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import AsJson, path_argument, path_option, print_json
+from apo_bench.cli.shared import AsJson, make_path_argument, make_path_option, print_json
 from apo_bench.io import clean
 
 _MOST_NAMES = 8  # settings that differ, on the terminal
 
 
 def compare_command(
-    first: Annotated[Path, path_argument("FIRST", "Folder of a sweep.")],
-    second: Annotated[Path, path_argument("SECOND", "Folder of another sweep with the same seeds.")],
-    out: Annotated[Path | None, path_option("Folder of the page and its tables; default: comparison.")] = None,
+    first: Annotated[Path, make_path_argument("FIRST", "Folder of a sweep.")],
+    second: Annotated[Path, make_path_argument("SECOND", "Folder of another sweep with the same seeds.")],
+    out: Annotated[Path | None, make_path_option("Folder of the page and its tables; default: comparison.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare two sweeps trial by trial (two versions, machines or fidelities), and write compare.html.

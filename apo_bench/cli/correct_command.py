@@ -14,28 +14,28 @@ from apo_bench.cli.shared import (
     DeviationMm,
     ScenarioArgument,
     check_output,
-    path_option,
+    make_path_option,
     print_columns,
     print_json,
     print_table,
     say,
 )
 from apo_bench.io import redirect_output, write_file
-from apo_bench.records import CORRECTOR, with_simulated
+from apo_bench.records import CORRECTOR, resolve_simulated
 
 _EXACT_M = 1e-9  # contacts that hold this well are a solution, at which a rank can be computed
 
 
 def correct_command(
     scenario: ScenarioArgument,
-    observation: Annotated[Path, path_option("Observed poses: .csv, or .json of `run --save-observation`.")],
+    observation: Annotated[Path, make_path_option("Observed poses: .csv, or .json of `run --save-observation`.")],
     method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     camera_noise: Annotated[
-        Path | None, path_option("Use the noise of this file of `noise fit` in place of the stated one.")
+        Path | None, make_path_option("Use the noise of this file of `noise fit` in place of the stated one.")
     ] = None,
-    out: Annotated[Path | None, path_option("Write the corrected poses: a plan (.json), or .csv.")] = None,
+    out: Annotated[Path | None, make_path_option("Write the corrected poses: a plan (.json), or .csv.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Correct observed poses by their face contacts.
@@ -62,7 +62,7 @@ def correct_command(
         observed = restate(observed, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
-        correction = correct(observed, with_simulated(method))
+        correction = correct(observed, resolve_simulated(method))
     explanation = _explain_solution(observed, correction)
     form = correction_form(task.name, method, observed, correction, explanation, assumed)
     lines = correction_lines(form, correction)

@@ -9,7 +9,15 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.shared import Command, ScenarioArgument, group, path_option, takes, trial_options, writing
+from apo_bench.cli.shared import (
+    Command,
+    ScenarioArgument,
+    add_options,
+    make_group,
+    make_path_option,
+    make_trial_options,
+    name_write_errors,
+)
 from apo_bench.errors import require
 from apo_bench.records import FIRST_TRAINING_TRIAL
 
@@ -20,16 +28,18 @@ Examples:
   apo-bench dataset make stick_in_tower --episodes 100 --out data
   apo-bench dataset make dovetail --format lerobot --record insertions --out inserted
 """
-commands = group("dataset", _HELP)
+commands = make_group("dataset", _HELP)
 
 
 @commands.command("make", cls=Command)
-@takes(trial_options("noise_level", "human_error_scale", "noise", "method", "clearance_mm", "robot_error", "arm"))
+@add_options(
+    make_trial_options("noise_level", "human_error_scale", "noise", "method", "clearance_mm", "robot_error", "arm")
+)
 def dataset_make(
     scenario: ScenarioArgument,
     more: Annotated[list[str] | None, typer.Argument(metavar="SCENARIO", help="More scenarios.")] = None,
     *,
-    out: Annotated[Path, path_option("Folder of the data set; it must not exist.")],
+    out: Annotated[Path, make_path_option("Folder of the data set; it must not exist.")],
     episodes: Annotated[int, typer.Option(min=1, help="Trials of each scenario.")] = 10,
     seed: Annotated[int, typer.Option(help="First seed; smaller ones are for evaluation.")] = FIRST_TRAINING_TRIAL,
     format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
@@ -66,6 +76,6 @@ def dataset_make(
         trials += [replace(config, seed=seed + k) for k in range(episodes)]
     led_by = (policy or "expert") if insertions else None
     command = shlex.join(["apo-bench", *sys.argv[1:]])
-    with writing():
+    with name_write_errors():
         made, right = make_dataset(trials, out, command, format, led_by, partial(typer.echo, err=True))
     typer.echo(f"{made} trials, {right} of them successful; {out / 'README.md'} describes them")

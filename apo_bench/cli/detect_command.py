@@ -10,23 +10,23 @@ from apo_bench.cli.shared import (
     DeviationDeg,
     DeviationMm,
     ScenarioArgument,
-    path_option,
+    add_options,
+    make_path_option,
+    make_trial_options,
     print_columns,
     print_json,
     print_table,
-    takes,
-    trial_options,
 )
 from apo_bench.errors import require_known
 from apo_bench.io import redirect_output
 from apo_bench.records import DETECTED
 
 
-@takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
+@add_options(make_trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
 def detect_contacts_command(
     scenario: ScenarioArgument,
     *,
-    observation: Annotated[Path | None, path_option("Use this observation in place of a trial.")] = None,
+    observation: Annotated[Path | None, make_path_option("Use this observation in place of a trial.")] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     contact_source: Annotated[str, typer.Option(help="detected, or detected-jointly.")] = "detected",

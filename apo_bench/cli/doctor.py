@@ -9,7 +9,7 @@ import typer
 from apo_bench import __version__
 from apo_bench.cli.shared import NO_RESULT, print_columns
 from apo_bench.errors import InputError
-from apo_bench.io import grouped
+from apo_bench.io import group_by
 
 _FOR_DEVELOPERS = ("dev", "docs", "notebook")
 """Extras that no command needs."""
@@ -48,7 +48,7 @@ def _read_extras() -> dict[str, list[str]]:
         extra = re.search(r"extra == ['\"](\w+)", requirement)
         name = re.match(r"[\w.-]+", requirement)
         pairs.append((extra.group(1) if extra else "", name.group() if name else requirement))
-    return {extra: [*dict.fromkeys(names)] for extra, names in grouped(pairs).items() if extra not in _FOR_DEVELOPERS}
+    return {extra: [*dict.fromkeys(names)] for extra, names in group_by(pairs).items() if extra not in _FOR_DEVELOPERS}
 
 
 def _find_version(package: str) -> str:

@@ -10,7 +10,7 @@ from apo_bench.cli.shared import (
     AsJson,
     ScenarioArgument,
     check_output,
-    path_option,
+    make_path_option,
     print_json,
     print_table,
     print_written,
@@ -23,7 +23,7 @@ def depth_command(
     seed: Annotated[int, typer.Option(help="Number of the demonstration.")] = 0,
     human_error_scale: Annotated[float, typer.Option(help="Factor on the human error of the scenario.")] = 1.0,
     view: Annotated[int, typer.Option(min=1, max=2, help="View of the depth camera in the picture.")] = 1,
-    out: Annotated[Path | None, path_option("Draw every stage of the estimation into this file: .png.")] = None,
+    out: Annotated[Path | None, make_path_option("Draw every stage of the estimation into this file: .png.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Estimate the poses of a demonstration from simulated depth images: what moved, which part, where to.

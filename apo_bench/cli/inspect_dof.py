@@ -12,7 +12,7 @@ from apo_bench.cli.shared import (
     DeviationMm,
     ScenarioArgument,
     check_output,
-    path_option,
+    make_path_option,
     print_json,
     print_table,
     print_written,
@@ -22,11 +22,11 @@ from apo_bench.cli.shared import (
 def dof_command(
     scenario: ScenarioArgument,
     observation: Annotated[
-        Path | None, path_option("Use the corrected poses of this observation; default: the nominal poses.")
+        Path | None, make_path_option("Use the corrected poses of this observation; default: the nominal poses.")
     ] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
-    out: Annotated[Path | None, path_option("Draw the free directions into this file: .png.")] = None,
+    out: Annotated[Path | None, make_path_option("Draw the free directions into this file: .png.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Explain the degrees of freedom: what each relation fixes, what is free, and how well poses are known.

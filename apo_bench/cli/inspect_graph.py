@@ -5,14 +5,22 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import AsJson, ScenarioArgument, check_output, path_option, print_json, print_written, say
+from apo_bench.cli.shared import (
+    AsJson,
+    ScenarioArgument,
+    check_output,
+    make_path_option,
+    print_json,
+    print_written,
+    say,
+)
 
 
 def graph_command(
     scenario: ScenarioArgument,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
-    observation: Annotated[Path | None, path_option("Show the residuals of this observation.")] = None,
-    out: Annotated[Path | None, path_option("Draw it into this file: .svg, .png, or .mmd (Mermaid text).")] = None,
+    observation: Annotated[Path | None, make_path_option("Show the residuals of this observation.")] = None,
+    out: Annotated[Path | None, make_path_option("Draw it into this file: .svg, .png, or .mmd (Mermaid text).")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost.
@@ -22,16 +30,16 @@ def graph_command(
       apo-bench inspect graph stick_in_tower --step 2 --observation docs/seen.csv
     """
     from apo_bench import load_scenario, read_observation
-    from apo_bench.assembly import observed_residuals, relation_graph
+    from apo_bench.assembly import build_relation_graph, compute_observed_residuals
     from apo_bench.io import write_file
     from apo_bench.viz.graph_picture import draw_graph
     from apo_bench.viz.graph_text import graph_form, graph_lines, mermaid_text
 
     check_output(out, "--out", ".svg", ".png", ".mmd")
     task = load_scenario(scenario)
-    graph = relation_graph(task.assembly, step)
+    graph = build_relation_graph(task.assembly, step)
     observed = None if observation is None else read_observation(observation, task)
-    residuals = [None] * len(graph.arcs) if observed is None else observed_residuals(observed, graph)
+    residuals = [None] * len(graph.arcs) if observed is None else compute_observed_residuals(observed, graph)
     gap_m = task.gap_mm * 1e-3 if observed is None else observed.gap_m
     title = f"{task.name} after operation {graph.step}"
     if out is not None and out.suffix.lower() == ".mmd":

@@ -13,7 +13,7 @@ from apo_bench.cli.shared import (
     DeviationMm,
     ScenarioArgument,
     check_output,
-    path_option,
+    make_path_option,
     print_json,
     print_written,
 )
@@ -29,16 +29,17 @@ from apo_bench.records import CORRECTOR, SETTINGS, WITHOUT_CORRECTOR
 def plan_command(
     scenario: ScenarioArgument,
     observation: Annotated[
-        Path | None, path_option("Plan for the poses of this observation; default: the nominal poses.")
+        Path | None, make_path_option("Plan for the poses of this observation; default: the nominal poses.")
     ] = None,
     method: Annotated[
         str | None, typer.Option(help=f"Method that plans from the observation; default: {CORRECTOR}.")
     ] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
-    robot: Annotated[Path | None, path_option("Write tip poses, grasps and guarded motions: .json.")] = None,
+    robot: Annotated[Path | None, make_path_option("Write tip poses, grasps and guarded motions: .json.")] = None,
     frames: Annotated[
-        Path | None, path_option("Base, flange and order of quaternions of --robot: .toml; default: base, tip, xyzw.")
+        Path | None,
+        make_path_option("Base, flange and order of quaternions of --robot: .toml; default: base, tip, xyzw."),
     ] = None,
     probing: Annotated[
         str | None,
@@ -55,7 +56,7 @@ def plan_command(
     """
     from apo_bench import load_scenario
     from apo_bench.formats.json_forms import write_form
-    from apo_bench.viz.plan_text import plan_form, plan_lines, plan_text
+    from apo_bench.viz.plan_text import describe_plan, plan_lines, plan_text
     from apo_bench.viz.robot_form import robot_form
 
     check_output(robot, "--robot", ".json")
@@ -97,7 +98,7 @@ def plan_command(
             form["probing"] = probing_form(plan, scene, robot_frames, probing)
         write_form(form, robot)
     if as_json:
-        print_json(plan_form(lines, task, notes) | {"predicted_success": predicted_success})
+        print_json(describe_plan(lines, task, notes) | {"predicted_success": predicted_success})
         return
     if predicted_success is not None:
         notes.insert(0, f"predicted success: {predicted_success:.2f}")

@@ -10,25 +10,25 @@ from apo_bench.cli.shared import (
     DeviationDeg,
     DeviationMm,
     ScenarioArgument,
+    add_options,
     check_output,
-    path_option,
+    make_path_option,
+    make_trial_options,
     print_written,
-    takes,
-    trial_options,
 )
 from apo_bench.errors import require
-from apo_bench.records import CORRECTOR, with_simulated
+from apo_bench.records import CORRECTOR, resolve_simulated
 
 
-@takes(trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
+@add_options(make_trial_options("noise_level", "human_error_scale", "seed", "noise", "pose_source"))
 def poses_command(
     scenario: ScenarioArgument,
     *,
-    out: Annotated[Path, path_option("Draw the poses into this file: .png.")] = Path("poses.png"),
+    out: Annotated[Path, make_path_option("Draw the poses into this file: .png.")] = Path("poses.png"),
     observed: Annotated[bool, typer.Option("--observed", help="Draw the observed poses alone.")] = False,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
     method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
-    observation: Annotated[Path | None, path_option("Use this observation in place of a trial.")] = None,
+    observation: Annotated[Path | None, make_path_option("Use this observation in place of a trial.")] = None,
     deviation_mm: DeviationMm = None,
     deviation_deg: DeviationDeg = None,
     **options: Any,
@@ -54,7 +54,7 @@ def poses_command(
     _check_observed(seen, step)
     panels = [poses_panel("observed", seen, seen.poses, step)]
     if not observed:
-        correction = correct(seen, with_simulated(method))
+        correction = correct(seen, resolve_simulated(method))
         if not correction.ok:
             raise RuntimeError(f"{method} found no correction: {correction.sentence}; --observed needs none")
         plan = fit_plan(correction, seen, task)

@@ -5,14 +5,14 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.shared import ScenarioArgument, check_output, path_option, takes, trial_options
-from apo_bench.records import check, in_python
+from apo_bench.cli.shared import ScenarioArgument, add_options, check_output, make_path_option, make_trial_options
+from apo_bench.records import check, convert_to_python_units
 
 
-@takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
+@add_options(make_trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
 def scene_command(
     scenario: ScenarioArgument,
-    out: Annotated[Path, path_option("Write the MJCF file: .xml.")],
+    out: Annotated[Path, make_path_option("Write the MJCF file: .xml.")],
     **options: Any,
 ) -> None:
     """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer.
@@ -26,7 +26,7 @@ def scene_command(
     from apo_bench.simulation.scene.scene import scene_xml
 
     check_output(out, "--out", ".xml")
-    settings = in_python({name: value for name, value in options.items() if value is not None})
+    settings = convert_to_python_units({name: value for name, value in options.items() if value is not None})
     for name, value in settings.items():
         check(name, value)
     write_file(out, scene_xml(load_scenario(scenario), **settings))

@@ -8,7 +8,7 @@ from apo_bench.cli.inspect_graph import graph_command
 from apo_bench.cli.inspect_plan import plan_command
 from apo_bench.cli.inspect_poses import poses_command
 from apo_bench.cli.inspect_scene import scene_command
-from apo_bench.cli.shared import Command, group
+from apo_bench.cli.shared import Command, make_group
 
 _HELP = """
 Look into one assembly: free directions, motions, relations, scene, poses, depth images.
@@ -25,6 +25,6 @@ _COMMANDS: Mapping[str, Callable[..., None]] = {
     "poses": poses_command,
     "depth": depth_command,
 }
-commands = group("inspect", _HELP)
+commands = make_group("inspect", _HELP)
 for _name, _command in _COMMANDS.items():
     commands.command(_name, cls=Command)(_command)

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import check_output, path_argument, path_option
-from apo_bench.io import brief, clean
+from apo_bench.cli.shared import check_output, make_path_argument, make_path_option
+from apo_bench.io import clean, shorten_text
 
 
 def leaderboard_command(
-    folder: Annotated[Path, path_argument("FOLDER", "Folder of entries: .json files.")],
-    out: Annotated[Path, path_option("Write the page: .md; its figure is next to it.")],
+    folder: Annotated[Path, make_path_argument("FOLDER", "Folder of entries: .json files.")],
+    out: Annotated[Path, make_path_option("Write the page: .md; its figure is next to it.")],
     secret_seed: Annotated[
         list[str] | None,
         typer.Option(help="Hash of a secret seed of yours: mark its entries as verified; may be repeated."),
@@ -29,5 +29,5 @@ def leaderboard_command(
     entries, left_out = read_entries(folder)
     write_leaderboard(entries, out, frozenset(secret_seed or ()))
     for sentence in left_out:
-        typer.echo(f"left out: {brief(clean(sentence))}", err=True)
+        typer.echo(f"left out: {shorten_text(clean(sentence))}", err=True)
     typer.echo(f"{len(entries)} entries in {out}")

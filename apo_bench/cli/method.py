@@ -2,7 +2,7 @@
 
 import typer
 
-from apo_bench.cli.shared import Command, group, print_columns
+from apo_bench.cli.shared import Command, make_group, print_columns
 
 _HELP = """
 Methods: what makes the robot's plan from the observation.
@@ -28,7 +28,7 @@ METHODS = {
     "spiral-search": "is uncorrected+spiral",
 }
 """Name -> description."""
-commands = group("method", _HELP)
+commands = make_group("method", _HELP)
 
 
 @commands.command("list", cls=Command)

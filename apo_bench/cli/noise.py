@@ -9,8 +9,8 @@ from apo_bench.cli.shared import (
     AsJson,
     Command,
     check_output,
-    group,
-    path_option,
+    make_group,
+    make_path_option,
     print_columns,
     print_json,
     print_written,
@@ -26,7 +26,7 @@ Examples:
   apo-bench noise list
   apo-bench noise show outliers
 """
-commands = group("noise", _HELP)
+commands = make_group("noise", _HELP)
 
 
 @commands.command("list", cls=Command)
@@ -71,12 +71,14 @@ def noise_show(
 
 @commands.command("fit", cls=Command)
 def noise_fit(
-    estimates: Annotated[Path, path_option("Poses of an estimator: a results file of the BOP format, .csv.")],
-    truth: Annotated[Path, path_option("True poses: .csv of that format, a scene_gt.json, or a folder of scenes.")],
+    estimates: Annotated[Path, make_path_option("Poses of an estimator: a results file of the BOP format, .csv.")],
+    truth: Annotated[
+        Path, make_path_option("True poses: .csv of that format, a scene_gt.json, or a folder of scenes.")
+    ],
     scene_id: Annotated[int | None, typer.Option(help="Read this scene alone; scene_gt.json names none.")] = None,
-    out: Annotated[Path | None, path_option("Write the noise file for --noise: .toml.")] = None,
-    residuals: Annotated[Path | None, path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
-    picture: Annotated[Path | None, path_option("Draw observed and fitted distributions: .png.")] = None,
+    out: Annotated[Path | None, make_path_option("Write the noise file for --noise: .toml.")] = None,
+    residuals: Annotated[Path | None, make_path_option("Write the residuals for --noise empirical:FILE: .csv.")] = None,
+    picture: Annotated[Path | None, make_path_option("Draw observed and fitted distributions: .png.")] = None,
     source: Annotated[str | None, typer.Option(help="Source to name in the noise file; default: the files.")] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -6,7 +6,16 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.shared import AsJson, Command, group, path_argument, path_option, print_json, say, writing
+from apo_bench.cli.shared import (
+    AsJson,
+    Command,
+    make_group,
+    make_path_argument,
+    make_path_option,
+    name_write_errors,
+    print_json,
+    say,
+)
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
 from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES
@@ -18,13 +27,13 @@ Examples:
   apo-bench part import bracket.step --out parts
   apo-bench part import bracket.stl --unit mm --name hole1=bore --out parts
 """
-commands = group("part", _HELP)
+commands = make_group("part", _HELP)
 
 
 @commands.command("import", cls=Command)
 def part_import(
-    file: Annotated[Path, path_argument("FILE", "A CAD file: .step, .stp, .stl, .obj or .3mf.")],
-    out: Annotated[Path, path_option("Folder of the part files and their pictures.")],
+    file: Annotated[Path, make_path_argument("FILE", "A CAD file: .step, .stp, .stl, .obj or .3mf.")],
+    out: Annotated[Path, make_path_option("Folder of the part files and their pictures.")],
     unit: Annotated[
         str | None, typer.Option(help="Unit of the file: mm, in, m, cm, ft or um; default: as the file states.")
     ] = None,
@@ -52,7 +61,7 @@ def part_import(
         not names or len(solids) <= 1,
         f"--name renames the faces of one solid, and {file} holds {len(solids)}; import each from its own file.",
     )
-    with writing(f"--out {out}"):
+    with name_write_errors(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("\n".join(file_lines(source, file)), as_json)
         imported, refused = _import_solids(file, [rename_faces(raw, names) for raw in solids], out, density, as_json)
@@ -70,19 +79,19 @@ def _import_solids(
     file: Path, solids: Sequence[Any], out: Path, density: float, as_json: bool
 ) -> tuple[list[Any], list[str]]:
     """Parts with their pictures, and the reasons why other solids became none."""
-    from apo_bench.importers.cad.importing import import_part
+    from apo_bench.importers.cad.importing import import_solid
     from apo_bench.importers.cad.part_picture import draw_part
     from apo_bench.importers.cad.part_report import part_lines, report_part
-    from apo_bench.importers.cad.solids.naming import clean_title, part_name
+    from apo_bench.importers.cad.solids.naming import clean_title, make_part_name
 
     imported: list[Any] = []
     refused: list[str] = []
     used: set[str] = set()
     for raw in solids:
-        stem = part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
+        stem = make_part_name(raw.name, used | _find_others(out, clean_title(raw.name)))
         used.add(stem)
         try:
-            part = import_part(raw, stem, out, file.name, density)
+            part = import_solid(raw, stem, out, file.name, density)
         except InputError as error:
             if len(solids) == 1:
                 raise

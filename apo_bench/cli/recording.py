@@ -8,10 +8,10 @@ import typer
 from apo_bench.cli.shared import (
     Command,
     check_output,
-    group,
+    make_group,
+    make_path_argument,
+    make_path_option,
     parse_list,
-    path_argument,
-    path_option,
     print_columns,
     print_written,
 )
@@ -25,23 +25,23 @@ Examples:
   apo-bench recording import log.csv --format csv --camera camera.toml --objects objects.toml --out seen.csv
   apo-bench correct stick_in_tower --observation seen.csv
 """
-commands = group("recording", _HELP)
+commands = make_group("recording", _HELP)
 
 
 @commands.command("import", cls=Command)
 def recording_import(
-    log: Annotated[Path, path_argument("LOG", "The log, or a folder with a file for each object.")],
+    log: Annotated[Path, make_path_argument("LOG", "The log, or a folder with a file for each object.")],
     form: Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")],
-    camera: Annotated[Path, path_option("Conventions of the log, and pose of its camera: .toml.")],
-    objects: Annotated[Path, path_option("Part and frame of each id: .toml.")],
-    out: Annotated[Path, path_option("Write the observation: .json, or .csv without starts and covariances.")],
+    camera: Annotated[Path, make_path_option("Conventions of the log, and pose of its camera: .toml.")],
+    objects: Annotated[Path, make_path_option("Part and frame of each id: .toml.")],
+    out: Annotated[Path, make_path_option("Write the observation: .json, or .csv without starts and covariances.")],
     scenario: Annotated[str | None, typer.Option(help="Scenario of the recording; .json needs one.")] = None,
     ends: Annotated[
         str | None, typer.Option(help="End of each operation in s, with commas, where the log is ambiguous.")
     ] = None,
     unseen: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
-    picture: Annotated[Path | None, path_option("Draw frames, paths and rests: .png.")] = None,
-    paths: Annotated[Path | None, path_option("Write the paths between rests: .csv.")] = None,
+    picture: Annotated[Path | None, make_path_option("Draw frames, paths and rests: .png.")] = None,
+    paths: Annotated[Path | None, make_path_option("Write the paths between rests: .csv.")] = None,
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations.
 

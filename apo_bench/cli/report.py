@@ -5,12 +5,12 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import SecretSeedFile, path_argument
+from apo_bench.cli.shared import SecretSeedFile, make_path_argument
 from apo_bench.io import clean, has_parquet
 
 
 def report_command(
-    folder: Annotated[Path, path_argument("FOLDER", "Folder that `sweep --out` wrote.")],
+    folder: Annotated[Path, make_path_argument("FOLDER", "Folder that `sweep --out` wrote.")],
     pictures: Annotated[
         int, typer.Option(min=0, max=100, help="Largest number of failures to draw; each one runs again for it.")
     ] = 6,

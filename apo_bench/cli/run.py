@@ -10,29 +10,31 @@ from apo_bench.cli.shared import (
     NO_RESULT,
     Port,
     ScenarioArgument,
+    add_options,
     check_output,
-    path_option,
+    make_path_option,
+    make_trial_options,
     print_columns,
     print_json,
-    takes,
-    trial_options,
 )
 from apo_bench.errors import require
 from apo_bench.io import redirect_output
 
 
-@takes(trial_options())
+@add_options(make_trial_options())
 def run_command(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[
-        Path | None, path_option("Replay this observation (.json or .csv) in place of a demonstration.")
+        Path | None, make_path_option("Replay this observation (.json or .csv) in place of a demonstration.")
     ] = None,
-    save_observation: Annotated[Path | None, path_option("Write the observed poses into this file: .json.")] = None,
-    video: Annotated[Path | None, path_option("Write a film of the replay: .mp4 or .gif.")] = None,
+    save_observation: Annotated[
+        Path | None, make_path_option("Write the observed poses into this file: .json.")
+    ] = None,
+    video: Annotated[Path | None, make_path_option("Write a film of the replay: .mp4 or .gif.")] = None,
     trial_limit: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in another process."),
+        typer.Option(metavar="SECONDS", help="End a trial that add_options longer; it runs in another process."),
     ] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print every number of the record.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Step through the trial after its end, as `view` does.")] = False,

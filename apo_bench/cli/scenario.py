@@ -11,9 +11,9 @@ from apo_bench.cli.shared import (
     Command,
     ScenarioArgument,
     check_output,
-    group,
-    path_argument,
-    path_option,
+    make_group,
+    make_path_argument,
+    make_path_option,
     print_columns,
 )
 from apo_bench.errors import require
@@ -26,7 +26,7 @@ Examples:
   apo-bench scenario list
   apo-bench scenario show pocket_table
 """
-commands = group("scenario", _HELP)
+commands = make_group("scenario", _HELP)
 Up = Annotated[
     str | None,
     typer.Option(help="Axis of the poses that points up: x, y, z, -x, -y or -z; default: z, or what works better."),
@@ -53,9 +53,9 @@ def scenario_list() -> None:
       apo-bench run generated:17 --seed 3
     """
     from apo_bench import load_scenario
-    from apo_bench.scenario.file import scenario_names
+    from apo_bench.scenario.file import list_scenario_names
 
-    loaded = map(load_scenario, scenario_names())
+    loaded = map(load_scenario, list_scenario_names())
     rows = [(each.name, str(len(each.assembly)), each.title, each.paper) for each in loaded]
     print_columns([("scenario", "operations", "title", "paper"), *rows])
 
@@ -81,8 +81,8 @@ def scenario_new(
         typer.Argument(metavar="PART", help="Part files; default: as named in --poses, next to it."),
     ] = None,
     *,
-    poses: Annotated[Path, path_option("File of [[pose]]: the final pose of every part.")],
-    out: Annotated[Path, path_option("Write the scenario: .toml.")],
+    poses: Annotated[Path, make_path_option("File of [[pose]]: the final pose of every part.")],
+    out: Annotated[Path, make_path_option("Write the scenario: .toml.")],
     up: Up = None,
     fixed: Fixed = None,
     order: Order = None,
@@ -139,7 +139,7 @@ def write_new_scenario(
 
 @commands.command("check", cls=Command)
 def scenario_check(
-    file: Annotated[Path, path_argument("FILE", "A scenario file.")],
+    file: Annotated[Path, make_path_argument("FILE", "A scenario file.")],
     seeds: Annotated[int, typer.Option(min=0, max=1000, help="Trials with the true poses.")] = 5,
     fidelity: Annotated[str, typer.Option(help="Fidelity of these trials: full, or near-contact.")] = "full",
     arm: Annotated[str, typer.Option(help="Arm, as in `arm check`.")] = SETTINGS["arm"].default,

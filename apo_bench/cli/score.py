@@ -16,7 +16,7 @@ from apo_bench.cli.shared import (
     Workers,
     check_output,
     count_cores,
-    path_option,
+    make_path_option,
     print_json,
     print_table,
     say,
@@ -35,18 +35,22 @@ def score_command(
     track: Annotated[
         list[str] | None, typer.Option(help="Track by name or file; may be repeated; default: all tracks.")
     ] = None,
-    out: Annotated[Path | None, path_option("Write the entry: .json; its records are in a folder next to it.")] = None,
+    out: Annotated[
+        Path | None, make_path_option("Write the entry: .json; its records are in a folder next to it.")
+    ] = None,
     command: Annotated[
         str | None,
         typer.Option(metavar="PROGRAM", help="Program that reads a request, one line of JSON, and answers."),
     ] = None,
     estimator: Annotated[
         Path | None,
-        path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
+        make_path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a few seeds of each condition, as a test.")] = False,
-    secret_seed_file: Annotated[Path | None, path_option("Draw trials that nobody can draw without this file.")] = None,
+    secret_seed_file: Annotated[
+        Path | None, make_path_option("Draw trials that nobody can draw without this file.")
+    ] = None,
     workers: Workers = None,
     backend: Backend = "local",
     address: Address = None,

@@ -14,31 +14,31 @@ from apo_bench.cli.shared import (
     Address,
     Backend,
     Workers,
-    completion,
+    add_options,
+    complete_last_word,
     count_cores,
-    path_option,
+    make_path_option,
+    make_sweep_options,
     read_axis,
-    sweep_options,
-    takes,
 )
 from apo_bench.errors import require
-from apo_bench.records import SETTINGS, in_python
+from apo_bench.records import SETTINGS, convert_to_python_units
 
 if TYPE_CHECKING:
     from apo_bench.benchmark.sweeps.grid import SweepConfig
 
 
-@takes(sweep_options())
+@add_options(make_sweep_options())
 def sweep_command(
     scenarios: Annotated[
         list[str],
         typer.Argument(
             metavar="SCENARIO",
             help="Scenarios by name or file, or one sweep file.",
-            autocompletion=completion("scenario"),
+            autocompletion=complete_last_word("scenario"),
         ),
     ],
-    out: Annotated[Path, path_option("Folder of the records; an interrupted sweep continues there.")],
+    out: Annotated[Path, make_path_option("Folder of the records; an interrupted sweep continues there.")],
     *,
     trials: Annotated[
         int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")
@@ -46,11 +46,13 @@ def sweep_command(
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
     secret_seed_file: Annotated[
         Path | None,
-        path_option("Draw trials that nobody can draw without this file; the sweep writes it if it does not exist."),
+        make_path_option(
+            "Draw trials that nobody can draw without this file; the sweep writes it if it does not exist."
+        ),
     ] = None,
     workers: Workers = None,
     trial_limit: Annotated[
-        float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
+        float, typer.Option(metavar="SECONDS", help="A trial that add_options longer has failed.")
     ] = 600.0,
     backend: Backend = "local",
     address: Address = None,
@@ -63,7 +65,7 @@ def sweep_command(
       apo-bench sweep mine.toml --out runs/mine --trials 100
     """
     from apo_bench import run_sweep
-    from apo_bench.benchmark.analysis import confusions, tally
+    from apo_bench.benchmark.analysis import tabulate_confusion, tally
     from apo_bench.benchmark.report.tables.methods import prediction_summary
     from apo_bench.cli.rates import print_rates
 
@@ -79,7 +81,7 @@ def sweep_command(
         secret_seed_file=secret_seed_file,
     )
     print_rates(tally(records))
-    typer.echo(prediction_summary(confusions(records)[-1]))
+    typer.echo(prediction_summary(tabulate_confusion(records)[-1]))
     typer.echo(f"{len(records)} records in {out / 'trials.jsonl'}; report: apo-bench report {shlex.quote(str(out))}")
 
 
@@ -94,7 +96,7 @@ def _read_grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[Sweep
     file = next(filter(is_sweep_file, scenarios), None)
     if file is None:
         values: dict[str, Any] = {info.name: read_axis(info, text) for info, text in texts.items()}
-        return (SweepConfig(tuple(scenarios), **values, **in_python(others)),)
+        return (SweepConfig(tuple(scenarios), **values, **convert_to_python_units(others)),)
     require(len(scenarios) == 1, f"the sweep file {file} excludes other scenarios; name them in the file.")
     given = ", ".join(f"--{info.option}" for info in texts)
     require(not given, f"{given} and the sweep file {file} exclude each other; write the setting into the file.")

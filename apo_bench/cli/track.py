@@ -2,7 +2,7 @@
 
 import typer
 
-from apo_bench.cli.shared import Command, group, print_columns
+from apo_bench.cli.shared import Command, make_group, print_columns
 
 _HELP = """
 Tracks: fixed trials that methods are scored on.
@@ -11,7 +11,7 @@ Examples:
   apo-bench track list
   apo-bench score contact --track given --out entry.json
 """
-commands = group("track", _HELP)
+commands = make_group("track", _HELP)
 
 
 @commands.command("list", cls=Command)

@@ -20,14 +20,18 @@ _LARGEST_JACOBIANS = 96_000
 def correct_many(
     observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
 ) -> tuple[Correction, ...]:
-    """Correct many observations of one assembly at once: as one after the other up to rounding, and faster.
+    """Correct many observations of one assembly in one batch: faster than `correct`, the same up to rounding.
 
     Args:
-        observations: Observations of one and the same assembly with the same start poses and play.
-        corrector: As `correct` has it by default; those whose test fails are then corrected one after the other.
+        observations: Observations of the same assembly with the same start poses and play.
+        corrector: A `ContactCorrector`, or the default of `correct`, which corrects observations whose test fails one
+            by one.
+
+    Returns:
+        The corrections, in the order of the observations.
 
     Raises:
-        InputError: They are not, one makes no sense, or a covariance is not positive definite.
+        InputError: The observations differ in assembly, start or play, or a covariance is not positive definite.
     """
     if not observations:
         return ()

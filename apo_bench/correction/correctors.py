@@ -13,7 +13,7 @@ from apo_bench.correction.checks.correction_checks import check_correction, chec
 from apo_bench.correction.checks.status import check_facing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, kind, require
-from apo_bench.geometry import Array, real
+from apo_bench.geometry import Array, copy_real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
 
@@ -26,17 +26,21 @@ class CorrectorMisbehaved(InputError):
 
 @check_arguments
 def correct(observation: Observation, corrector: Any = CORRECTOR, reobserve: Reobserver | None = None) -> Correction:
-    """Correct an observation.
+    """Correct the poses of an observation.
 
     Args:
-        corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
-            bare poses (n, 4, 4) in place of a `Correction` are measured and wrapped.
+        observation: From `observe` or `read_observation`.
+        corrector: A name (`apo-bench method list`), `"package.module:name"`, or a callable `Observation ->
+            Correction`; it may return bare poses (n, 4, 4), world frame, [m], which are wrapped.
         reobserve: Observes operations again. A corrector with a method `correct_and_reobserve` (`ReobservingCorrector`)
             gets it, and that method is called in place of the corrector; any other gets nothing.
 
+    Returns:
+        Poses, status and test; check `ok` before you execute them.
+
     Raises:
-        InputError: There is no such corrector, or the observation makes no sense.
-        CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
+        InputError: There is no such corrector, or the observation is inconsistent.
+        CorrectorMisbehaved: The corrector raised an error, or returned something else or an impossible schedule.
     """
     check_observation(observation)
     chosen = resolve_corrector(corrector)
@@ -114,7 +118,7 @@ def _is_ours(corrector: Any) -> bool:
 def _checked_poses(returned: Any, n: int, name: str) -> Array:
     """Poses as an array (n, 4, 4), numbers that are not finite let through."""
     try:
-        poses = real(returned)
+        poses = copy_real(returned)
     except ArgumentError as error:
         raise InputError(f"the corrector '{name}' returned complex numbers as poses; return real ones.") from error
     except (TypeError, ValueError):

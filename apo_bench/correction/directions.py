@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, frozen
+from apo_bench.geometry import Array, copy_frozen
 
 SHIFT_NAMES = ("x", "y", "z")
 TURN_NAMES = ("roll", "pitch", "yaw")
@@ -30,7 +30,7 @@ class Direction:
     """(6,), body frame of the part: one metre of a shift, or one radian of a turn."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "twist", frozen(self.twist, 6))
+        object.__setattr__(self, "twist", copy_frozen(self.twist, 6))
 
     def __str__(self) -> str:
         """`x`, `yaw`, `x with y` (oblique), `yaw with z` (a screw)."""

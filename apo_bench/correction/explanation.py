@@ -24,17 +24,17 @@ from apo_bench.assembly import (
     Observation,
     Operation,
     Poses,
-    contact_pattern,
-    placements,
+    compute_placements,
+    find_contact_pattern,
     project_observation,
 )
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
-from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearise_by, twists_of
+from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, compute_freedom, linearise_by, unwhiten_twists
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 _ZERO = 1e-7
 """Components of an orthonormal basis below this are rounding."""
@@ -122,12 +122,15 @@ class Explanation:
 
 @check_arguments
 def explain(observation: Observation, poses: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
-    """What the contacts determine at poses that satisfy them, and how uncertain these are after what was observed.
+    """Explain which directions the contacts determine, which stay free, and how uncertain each pose is.
 
     Args:
-        poses: (n, 4, 4), consistent with every contact, world frame, [m]; or a correction, which says in addition what
-            of the observation is assumed and which relations are not.
-        dropped: Relations, R1, R2, .., that are left out; so are inequalities, which leave a part free between them.
+        observation: The observation, whose covariance gives the uncertainty.
+        poses: (n, 4, 4), consistent with every contact, world frame, [m]; or a `Correction`.
+        dropped: Relations (R1, R2, ...) to leave out, as inequalities are.
+
+    Returns:
+        Free directions of every operation, and posterior standard deviations; `apo-bench inspect dof` prints it.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
@@ -151,15 +154,15 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
     kept = problem.demands.exact & problem.without(tuple(dropped))
     # B = J_r(xi) L makes body twists at the poses of z, so J B is the derivative by z.
     xi = pose.log(pose.inverse(observation.poses) @ poses)
-    Jr = right_jacobian(xi)
+    Jr = compute_right_jacobian(xi)
     B = Jr @ problem.L[0]
     _, Jt = linearise_by(system, poses, B)
     every = relation_holds(assembly)
     relations = by_relation(assembly, system, Jt, kept)
-    known = freedom_of(relations.Jt)
+    known = compute_freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
-    spans = twists_of(B, known.free)
+    spans = unwhiten_twists(B, known.free)
     shared = tuple[SharedEstimate, ...]()
     if observation.shared:
         shared, spans = estimate_shared(observation, xi, Jr, system.among(kept))
@@ -198,7 +201,7 @@ def explain(observation: Observation, poses: Array | Correction, dropped: Collec
 
 def _void(assembly: Assembly, kept: NDArray[np.bool_]) -> int:
     """How many compact equations say nothing: of contacts that are not kept, and of fewer than three points."""
-    said = np.where(kept, np.minimum(np.diff(contact_pattern(assembly).begin), 3), 0)
+    said = np.where(kept, np.minimum(np.diff(find_contact_pattern(assembly).begin), 3), 0)
     return int((3 - said).sum())
 
 
@@ -242,7 +245,7 @@ def _standing(assembly: Assembly, start: Poses, poses: Array, B: Array, spans: A
     """Every part that was moved, at the end; its pose is a product of poses, so errors go through all of them."""
     if not len(assembly):
         return ()
-    final = placements(assembly, start, poses)[-1]
+    final = compute_placements(assembly, start, poses)[-1]
     last = assembly.odls()[-1]
     # The ODLs at the end, in which one operation per part that puts it at its start comes first.
     words = dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Correction, Observation, project_observation
 from apo_bench.correction.contact.drawn import drawn_radius
 from apo_bench.correction.contact.problem import seen_system
-from apo_bench.correction.solvers import coordinates_of, freedom_of, linearise_by, noise_factor
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.correction.solvers import compute_freedom, factor_noise, linearise_by, whiten_twists
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 
 def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
@@ -45,16 +45,16 @@ def _contains(assumed: Observation, poses: Array, dropped: tuple[str, ...], trut
     from scipy.special import chdtri
 
     observation = project_observation(assumed)
-    L = noise_factor(observation)
+    L = factor_noise(observation)
     xi = pose.log(pose.inverse(observation.poses) @ poses)
     system = seen_system(observation).among(_equal(observation, dropped))
-    known = freedom_of(linearise_by(system, poses, right_jacobian(xi) @ L)[1])
+    known = compute_freedom(linearise_by(system, poses, compute_right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free
     true = pose.log(pose.inverse(observation.poses) @ truth)
     # Deviation of the truth in the tangent space of the contacts, in standard deviations.
-    off = free.T @ coordinates_of(L, true - xi)
+    off = free.T @ whiten_twists(L, true - xi)
     tailed = observation.tails is not None
     most = drawn_radius(observation, L, free, level) if tailed else chdtri(free.shape[1], 1.0 - level)
     return bool(off @ off <= most)

@@ -12,7 +12,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import ODL, Assembly, invert, simplify
+from apo_bench.assembly import ODL, Assembly, invert, simplify_odl
 from apo_bench.correction.solvers import (
     RANK_CUT_OFF,
     CompactEquations,
@@ -45,7 +45,7 @@ def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
     for i, arc in enumerate(assembly.arcs(), start=1):
         contact, made, lost = relations[arc[0]]
         a, b = assembly.given(contact)
-        word = simplify((*invert(history[made].get(a.part, ())), *history[made].get(b.part, ())))
+        word = simplify_odl((*invert(history[made].get(a.part, ())), *history[made].get(b.part, ())))
         holds.append(RelationHold(f"R{i}", (a.part, b.part), made, lost, word))
     return tuple(holds)
 

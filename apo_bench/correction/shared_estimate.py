@@ -5,13 +5,13 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, SharedError, joint_covariance
+from apo_bench.assembly import Observation, SharedError, compute_joint_covariance
 from apo_bench.correction.solvers import (
     CompactEquations,
-    freedom_of,
+    compute_freedom,
+    factor_noise,
     linearise_by,
-    noise_factor,
-    twists_of,
+    unwhiten_twists,
 )
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
@@ -54,12 +54,12 @@ def estimate_shared(
     Raises:
         InputError: Too many operations.
     """
-    L = noise_factor(observation)
+    L = factor_noise(observation)
     seen = observation.poses
-    known = freedom_of(linearise_by(system, seen @ pose.exp(xi), Jr @ L)[1])
+    known = compute_freedom(linearise_by(system, seen @ pose.exp(xi), Jr @ L)[1])
     if known is None:
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
-    joint = joint_covariance(seen, observation.covariance, observation.shared)
+    joint = compute_joint_covariance(seen, observation.covariance, observation.shared)
     free = L.reshape(xi.size, xi.size) @ known.free
     estimates = []
     for error in observation.shared:
@@ -72,4 +72,4 @@ def estimate_shared(
         K = np.linalg.solve(joint, AC).T
         C = error.covariance - K @ AC + (K @ free) @ (K @ free).T
         estimates.append(SharedEstimate(error, -(K @ xi.ravel()), (C + C.T) / 2))
-    return tuple(estimates), twists_of(Jr @ L, known.free)
+    return tuple(estimates), unwhiten_twists(Jr @ L, known.free)

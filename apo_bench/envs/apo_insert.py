@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
 from apo_bench.envs.episode import EpisodeSettings, Scenes, episode_options, replace_settings, trial_number
-from apo_bench.envs.episode_start import EpisodeStart, Trials, judged
+from apo_bench.envs.episode_start import EpisodeStart, TrialStarts, judged
 from apo_bench.envs.robot import RobotSettings
 from apo_bench.envs.spaces import PIXELS, insert_observation, insert_space
 from apo_bench.errors import InputError, require, shown, unknown
@@ -30,13 +30,13 @@ from apo_bench.records import (
     USUAL,
     TrialConfig,
     check,
-    noise_pair,
-    sentence,
+    describe_outcome,
+    parse_noise_level,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.robot import ExecutionAborted
-from apo_bench.simulation.scene import Scene, build_scene, data_with_arm
+from apo_bench.simulation.scene import Scene, build_data_with_arm, build_scene
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]
@@ -97,7 +97,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     ## Episode End
     It terminates when the hand opens, when the filtered force on the part (8 Hz) exceeds `fails_above_n`, and when
     something collides or is dropped. After `horizon` actions it is truncated: the hand opens and the judge decides.
-    `info` then holds `success` (also as `is_success`), `code` and `sentence`; before, `success` is False.
+    `info` then holds `success` (also as `is_success`), `code` and `describe_outcome`; before, `success` is False.
 
     ## Arguments
     - `scenario`, `noise_level`, `human_error_scale`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as in
@@ -179,10 +179,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         scene = build_scene(loaded, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s)
         self._scenes = Scenes(scene)
         self._model = USUAL if noise is None else noise
-        level = NoiseLevel(*noise_pair(noise_level))
+        level = NoiseLevel(*parse_noise_level(noise_level))
         self._settings = EpisodeSettings(level, human_error_scale, clearance_mm)
         robot = RobotSettings(robot_error, probe, ft_sensor, assumed_robot_error).checked()
-        self._trials = self._usual = Trials(
+        self._trials = self._usual = TrialStarts(
             scene, int(k) - 1, human_error_scale, make_noise(self._model, level), planner, robot
         )
         self._residual = bool(residual)
@@ -258,7 +258,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._begin(self._drawn() if number is None else self._start_of(number))
         return self._seen(), {}
 
-    def _changed(self, settings: EpisodeSettings) -> Trials:
+    def _changed(self, settings: EpisodeSettings) -> TrialStarts:
         """The trials with other settings."""
         return self._usual._replace(
             scene=self._scenes.of(settings.clearance_mm),
@@ -315,7 +315,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     def mujoco_data(self) -> Any:
         """The live `mujoco.MjData` of this episode; before the first one, parts at their start. It holds the truth."""
         if self._begun is None:
-            return data_with_arm(self.scene, self.scene.scenario.start)
+            return build_data_with_arm(self.scene, self.scene.scenario.start)
         return self._at_work().robot.data
 
     def __getstate__(self) -> dict[str, Any]:
@@ -386,7 +386,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     def _ended_by(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
         k = self._now().start.operation
         main = self._trials.scene.scenario.assembly.operations[k].main
-        said = sentence(code, part=part or main, operation=k) + (f": {why}" if why else "")
+        said = describe_outcome(code, part=part or main, operation=k) + (f": {why}" if why else "")
         return ended(code, said)
 
     def _seen(self) -> Seen:

@@ -31,17 +31,17 @@ from apo_bench.perception.observation.reobservations import Reobservations
 from apo_bench.records import (
     DEPTH_CAMERA,
     USUAL,
-    Predicted,
+    FailurePrediction,
     TrialConfig,
     check,
     check_grip,
     check_together,
-    noise_pair,
+    parse_noise_level,
     refuse_noise,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.scene import build_scene, data_with_arm
+from apo_bench.simulation.scene import build_data_with_arm, build_scene
 from apo_bench.trial.fitting import fit_plan
 from apo_bench.trial.predicted_success import abstain, predict_success
 from apo_bench.trial.stages import (
@@ -171,7 +171,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._model = USUAL if noise is None else noise
         self._allowed = max_reobservations
         self._usual = self._now = EpisodeSettings(
-            NoiseLevel(*noise_pair(noise_level, pose_source)), human_error_scale, clearance_mm
+            NoiseLevel(*parse_noise_level(noise_level, pose_source)), human_error_scale, clearance_mm
         )
         self._noise = self._usual_noise = make_noise(self._model, self._usual.noise_level)
         self._scene = build_scene(
@@ -306,7 +306,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def mujoco_data(self) -> Any:
         """The state that the mode `rgb_array` renders, a new `mujoco.MjData`; it holds the truth."""
-        return data_with_arm(self._scene, self._rendering.poses, self._rendering.state)
+        return build_data_with_arm(self._scene, self._rendering.poses, self._rendering.state)
 
     def close(self) -> None:
         """Close the window, if one is open."""
@@ -323,7 +323,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._now = now
         self._noise = noise
 
-    def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None, float | None]:
+    def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, FailurePrediction | None, float | None]:
         """The verdicts, how the replay ended, its failure prediction and its predicted success."""
         episode = self._current("there is no trial")
         simulated = episode.simulated

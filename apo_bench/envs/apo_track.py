@@ -11,11 +11,11 @@ from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
-from apo_bench.envs.tracking import Act, Policy, Tracked, observe_first, reach_exactly
+from apo_bench.envs.tracking import Policy, Tracked, TrackingAction, observe_first, reach_exactly
 from apo_bench.errors import InputError, shown
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
-from apo_bench.records import Criteria, sentence
+from apo_bench.records import Criteria, describe_outcome
 from apo_bench.trial.stages import Attempt, SimulatedDemonstration, demonstration_failure, trial_outcome
 
 DO, UNDO, FINISH = range(3)
@@ -131,7 +131,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         """(n, 4, 4): the poses at which operations were done last; the observed poses of those that never were."""
         return self._placed.copy()
 
-    def action(self, act: Act) -> dict[str, Any]:
+    def action(self, act: TrackingAction) -> dict[str, Any]:
         """The action that does this act."""
         goal = self._base.observation.poses[self._done - act.undo]
         twist = np.zeros(6) if act.undo else pose.log(pose.inverse(goal) @ act.target)
@@ -158,7 +158,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
     def _judged(self) -> tuple[float, dict[str, Any]]:
         if self._done < len(self._placed):
             return _end_info(
-                dict.fromkeys(VERDICTS, False), Outcome("judge", "not_made", self._done, sentence("not_made"))
+                dict.fromkeys(VERDICTS, False), Outcome("judge", "not_made", self._done, describe_outcome("not_made"))
             )
         if not self._replay:
             return _judged_at(
@@ -197,7 +197,7 @@ def _judged_at(
         return _end_info(dict.fromkeys(VERDICTS, False), demonstration_failure(simulated.demonstration))
     reached = reach_exactly(seen, goals)
     verdict = judge(seen.assembly, reached, simulated.layout.poses, criteria)
-    there = ReplayResult(reached, Outcome("done", "ok", None, sentence("ok")), 0.0, 0.0)
+    there = ReplayResult(reached, Outcome("done", "ok", None, describe_outcome("ok")), 0.0, 0.0)
     return _end_info(verdicts(verdict), trial_outcome(Attempt(there, verdict)))
 
 

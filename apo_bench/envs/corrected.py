@@ -15,19 +15,28 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 @final
 @check_arguments
-class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
-    """Correct the observed poses at every reset.
+class CorrectPoses(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
+    """Correct the observed poses of `APOReplay-v0` at every reset.
 
-    The observation holds the corrected poses, with the directions that contacts leave free chosen as in trials. Zeros
-    replay them, and an action is applied on top. If a correction does not converge, the step ends with reward 0 at
-    stage `correct`. A correction that undoes operations is executed with its schedule; the twist of an operation then
-    applies to every step of it.
+    The observation holds the corrected poses, with the directions that contacts leave free chosen as in trials. An
+    action of zeros replays them; another one is applied to them. If a correction does not converge, the step ends with
+    reward 0 at stage `correct`. A correction that undoes operations is executed with its schedule; the twist of an
+    operation then applies to every step of it.
+
+    Examples:
+        >>> import apo_bench, gymnasium, numpy as np
+        >>> env = apo_bench.CorrectPoses(gymnasium.make("APOReplay-v0", scenario="block_on_block", noise_level=1))
+        >>> observation, info = env.reset(seed=7)
+        >>> observation, reward, terminated, truncated, info = env.step(np.zeros(env.action_space.shape))
+        >>> reward
+        1.0
     """
 
     def __init__(self, env: gymnasium.Env[Seen, Action], corrector: str | Callable[..., Any] = CORRECTOR) -> None:
         """Wrap an `APOReplay` environment.
 
         Args:
+            env: An environment of `APOReplay-v0`.
             corrector: A name, `"package.module:name"`, or a callable `Observation -> Correction`.
 
         Raises:
@@ -39,7 +48,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         gymnasium.utils.RecordConstructorArgs.__init__(self, corrector=corrector)
         super().__init__(env)
         if not isinstance(env.unwrapped, APOReplay):
-            raise InputError(f"`Corrected` wraps an APOReplay environment, {env.unwrapped} was given.")
+            raise InputError(f"`CorrectPoses` wraps an APOReplay environment, {env.unwrapped} was given.")
         self._base: APOReplay = env.unwrapped
         self._corrector = resolve(corrector, {**CORRECTORS, **SIMULATED}, "corrector")
         if not callable(self._corrector):

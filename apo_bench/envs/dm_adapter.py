@@ -16,7 +16,7 @@ from dm_env import specs
 from gymnasium import spaces
 
 from apo_bench.errors import missing_package, require
-from apo_bench.io import SAFE_PATH, environment
+from apo_bench.io import SAFE_PATH, set_environment
 from apo_bench.simulation.scene import copy_data
 
 _STREAM = 0x646D
@@ -96,7 +96,7 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
             copy_data(self._env.unwrapped.mujoco_data(), self._physics.data.ptr)  # type: ignore[attr-defined]
 
 
-@environment({SAFE_PATH: "1"})
+@set_environment({SAFE_PATH: "1"})
 def _physics(data: Any) -> Any:
     """A copy of `mujoco.MjData` and its model; GLFW, which comes along, starts a Python while it is imported."""
     try:

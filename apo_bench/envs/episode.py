@@ -11,7 +11,7 @@ from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
 from apo_bench.perception.observation.noise import NoiseLevel
 from apo_bench.perception.observation.reobservations import Reobservations
-from apo_bench.records import Predicted, check, noise_pair
+from apo_bench.records import FailurePrediction, check, parse_noise_level
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
@@ -101,7 +101,7 @@ def replace_settings(usual: EpisodeSettings, asked: Mapping[str, Any], pose_sour
     """
     changes = {name: value for name, value in asked.items() if name != "trial"}
     if "noise_level" in changes:
-        changes["noise_level"] = NoiseLevel(*noise_pair(changes["noise_level"], pose_source))
+        changes["noise_level"] = NoiseLevel(*parse_noise_level(changes["noise_level"], pose_source))
     return replace(usual, **changes)
 
 
@@ -188,7 +188,7 @@ def verdicts(verdict: Verdict) -> dict[str, bool]:
 
 
 def step_info(
-    verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None, predicted_success: float | None
+    verdicts: Mapping[str, bool], end: Outcome, predicted: FailurePrediction | None, predicted_success: float | None
 ) -> dict[str, Any]:
     """`info` after the last step."""
     return {

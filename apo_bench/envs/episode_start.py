@@ -6,12 +6,12 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, ReachedState, Snapshot, compute_placements
 from apo_bench.envs.robot import RobotSettings
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.perception.observation.noise import Noise
-from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas
+from apo_bench.records import NO_ROBOT_ERROR, parse_robot_error
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, prepare_next_start, prepare_start
@@ -55,7 +55,7 @@ class EpisodeStart:
         assembly = self.plan.assembly
         k = self.start.operation
         operation = assembly.operations[k]
-        true = placements(assembly, self.plan.start, self.poses)[k]
+        true = compute_placements(assembly, self.plan.start, self.poses)[k]
         now = control.poses()
         # Where a part in the hand, the main one or one that it carries, belongs beside a part that stands.
         pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
@@ -65,7 +65,7 @@ class EpisodeStart:
         return control.off([T @ now[operation.main] for T in wanted])
 
 
-class Trials(NamedTuple):
+class TrialStarts(NamedTuple):
     """What determines a start besides the number of its trial."""
 
     scene: Scene
@@ -120,14 +120,14 @@ def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | N
         after: After each of them.
         reference: (k, 4, 4), their true poses, world frame, [m].
     """
-    return judge(scene.scenario.assembly.first(len(after)), Reached(after, final), reference, scene.criteria)
+    return judge(scene.scenario.assembly.first(len(after)), ReachedState(after, final), reference, scene.criteria)
 
 
 def _stated(seen: Observation, correction: Correction | None, assumed: str | None) -> Array:
     """The covariance that the corrector leaves, and that of the assumed robot error without its joints, (n, 6, 6)."""
     posterior = None if correction is None else correction.covariance
     covariance = seen.covariance if posterior is None else posterior
-    sigmas = robot_sigmas(assumed or NO_ROBOT_ERROR)
+    sigmas = parse_robot_error(assumed or NO_ROBOT_ERROR)
     mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])
     deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])
     return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))

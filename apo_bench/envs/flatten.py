@@ -20,6 +20,12 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
 
     Observations are one `Box` of float32, as `gymnasium.spaces.flatten` orders them. Actions are one `Box` of float32
     in [-1, 1]: the numbers of a `Box` are scaled to its bounds, and of the numbers of a `Discrete` the largest counts.
+
+    Examples:
+        >>> import apo_bench, gymnasium
+        >>> env = apo_bench.Flatten(gymnasium.make("APOReplay-v0", scenario="block_on_block"))
+        >>> env.action_space
+        Box(-1.0, 1.0, (12,), float32)
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
@@ -39,12 +45,12 @@ class Flatten(gymnasium.Wrapper[Flat, Flat, Any, Any], gymnasium.utils.RecordCon
         self.action_space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Flat, dict[str, Any]]:
-        """As in the environment, flat."""
+        """Reset the environment; return the flat observation."""
         seen, info = self.env.reset(seed=seed, options=options)
         return self._flat(seen), info
 
     def step(self, action: Flat) -> tuple[Flat, float, bool, bool, dict[str, Any]]:
-        """As in the environment, flat.
+        """Take a flat action; return the flat observation.
 
         Raises:
             InputError: The action is not in the action space.

@@ -4,7 +4,12 @@ from typing import Any, NamedTuple
 
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array
-from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_ft_sensor, checked_robot_error
+from apo_bench.records import (
+    normalise_assumed_robot_error,
+    normalise_ft_sensor,
+    normalise_robot_error,
+    parse_assumed_error,
+)
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.run import probing_config
@@ -29,16 +34,16 @@ class RobotSettings(NamedTuple):
             InputError: An unknown name, or a number that is not allowed.
         """
         return RobotSettings(
-            checked_robot_error(self.robot_error),
+            normalise_robot_error(self.robot_error),
             bool(self.probe),
-            checked_ft_sensor(self.ft_sensor),
-            checked_assumed_robot_error(self.assumed_robot_error),
+            normalise_ft_sensor(self.ft_sensor),
+            normalise_assumed_robot_error(self.assumed_robot_error),
         )
 
     @property
     def assumed(self) -> str | None:
-        """The robot error that the robot assumes, as in `robot_sigmas`; None if it is unknown."""
-        return assumed_error(self.assumed_robot_error, self.robot_error)
+        """The robot error that the robot assumes, as in `parse_robot_error`; None if it is unknown."""
+        return parse_assumed_error(self.assumed_robot_error, self.robot_error)
 
     def execution(self, plan: Plan, scene: Scene, trial: int, fidelity: str = "full") -> ExecutionConfig:
         """How it executes a plan in a trial, which determines its errors and the noise of its sensor."""

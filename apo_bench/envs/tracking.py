@@ -6,7 +6,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Reached, Snapshot, placements, project_observation
+from apo_bench.assembly import Observation, ReachedState, Snapshot, compute_placements, project_observation
 from apo_bench.correction.baselines.track import nested, next_operation, reached_back
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers import LENGTH_M
@@ -25,7 +25,7 @@ class Tracked:
 
 
 @final
-class Act(NamedTuple):
+class TrackingAction(NamedTuple):
     """Do the next operation, or undo the last one that is done."""
 
     undo: bool
@@ -33,11 +33,11 @@ class Act(NamedTuple):
     """(4, 4): target pose of its main part, or the present pose; world frame, [m]."""
 
 
-Policy = Callable[[Tracked], tuple[Act, ...]]
+Policy = Callable[[Tracked], tuple[TrackingAction, ...]]
 """The acts until the last operation shown is done; no act gives up."""
 
 
-def paper_track_policy(known: Tracked) -> tuple[Act, ...]:
+def paper_track_policy(known: Tracked) -> tuple[TrackingAction, ...]:
     """The corrector `paper-track`, act by act: free the most recent candidates until every contact holds."""
     seen = project_observation(known.observation)
     if not seen.observed.all():
@@ -46,7 +46,7 @@ def paper_track_policy(known: Tracked) -> tuple[Act, ...]:
     return _acts(known, step.poses, step.freed) if step.status == "converged" else ()
 
 
-def contact_policy(known: Tracked) -> tuple[Act, ...]:
+def contact_policy(known: Tracked) -> tuple[TrackingAction, ...]:
     """Correct all observed operations by `contact`; redo those that it moves by more than the gap."""
     correction = correct(known.observation, "contact")
     if not correction.ok:
@@ -56,8 +56,10 @@ def contact_policy(known: Tracked) -> tuple[Act, ...]:
     return _acts(known, correction.poses, np.flatnonzero(m > known.observation.gap_m).tolist())
 
 
-def _acts(known: Tracked, goals: Array, freed: list[int] | tuple[int, ...]) -> tuple[Act, ...]:
-    return tuple(Act(undo, (known.placed if undo else goals)[k]) for k, undo in reached_back(len(goals) - 1, freed))
+def _acts(known: Tracked, goals: Array, freed: list[int] | tuple[int, ...]) -> tuple[TrackingAction, ...]:
+    return tuple(
+        TrackingAction(undo, (known.placed if undo else goals)[k]) for k, undo in reached_back(len(goals) - 1, freed)
+    )
 
 
 def observe_first(observation: Observation, m: int) -> Observation:
@@ -80,8 +82,8 @@ def observe_first(observation: Observation, m: int) -> Observation:
     )
 
 
-def reach_exactly(observation: Observation, poses: Array) -> Reached:
+def reach_exactly(observation: Observation, poses: Array) -> ReachedState:
     """The state in which every part rests exactly at its pose, (n, 4, 4), released."""
-    stages = placements(observation.assembly, observation.start, poses)
+    stages = compute_placements(observation.assembly, observation.start, poses)
     after = tuple(Snapshot(poses, 0.0, 0.0, 0.0, True) for poses in stages)
-    return Reached(after, after[-1] if after else Snapshot(observation.start, 0.0, 0.0, 0.0, True))
+    return ReachedState(after, after[-1] if after else Snapshot(observation.start, 0.0, 0.0, 0.0, True))

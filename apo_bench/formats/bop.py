@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import opened
+from apo_bench.io import open_file
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 _NUMBERS = 14
@@ -56,7 +56,7 @@ def read_results(path: str | Path) -> PoseRows:
         InputError: Anything that is not as described, with the line where it stands.
     """
     numbers = array("d")
-    with opened(path, "CSV file") as stream:
+    with open_file(path, "CSV file") as stream:
         for line, raw in enumerate(stream, start=1):
             text = raw.decode("utf-8-sig", "replace").strip()
             place = f"{path}, line {line}"

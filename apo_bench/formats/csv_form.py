@@ -21,7 +21,7 @@ from apo_bench.errors import require
 from apo_bench.formats.deviations import SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io import Columns, CsvRow, check_quaternion, read_csv
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario import Scenario, place_layout
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -67,7 +67,7 @@ def read_table(path: str | Path, scenario: Scenario, assumed: tuple[float, float
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
     observation = Observation(
         assembly=assembly,
-        start=layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
+        start=place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
         poses=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
         covariance=np.array([np.diag([s] * 3 + [t] * 3) ** 2 for s, t in zip(shift, turn, strict=True)]).reshape(
             -1, 6, 6

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io import Quadruple, Table, Text, check_quaternion, write_file
+from apo_bench.io import FileTable, Quadruple, Text, check_quaternion, write_file
 
 TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 _FARTHEST_MM = 1e3 * FARTHEST_M
@@ -24,7 +24,7 @@ Form = dict[str, Any]
 """What `json` can write."""
 
 
-class PoseForm(Table, frozen=True, kw_only=True):
+class PoseForm(FileTable, frozen=True, kw_only=True):
     """A pose in the world."""
 
     position_mm: Position

@@ -12,7 +12,7 @@ from apo_bench.errors import require
 from apo_bench.formats.csv_form import read_table
 from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.formats.observation_json import read_json_observation
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario import Scenario, place_layout
 
 
 class ObservationFile(NamedTuple):
@@ -35,12 +35,16 @@ def read_observation(
     """Read an observation from a `.csv` file, or from the JSON form of any other.
 
     Args:
-        scenario: The scenario it is of, its name, or its file.
+        path: A file with one pose per operation; `docs/guide/measured.md` describes its columns and keys.
+        scenario: The scenario of the poses, its name, or its file.
         deviation_mm: Standard deviation along each axis where the file states none.
         deviation_deg: Standard deviation about each axis where the file states none.
 
+    Returns:
+        The observation, for `correct`.
+
     Raises:
-        InputError: Anything that is not as described, with the place where it stands.
+        InputError: A fault of the file, with its line or key.
     """
     return read_observation_file(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
 
@@ -87,7 +91,7 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
     """Return the nominal poses of a scenario, as if they had been observed with these standard deviations."""
     check_deviations(deviation_mm, deviation_deg)
-    layout = layout_at(scenario, 0.0, 0.0, 0.0)
+    layout = place_layout(scenario, 0.0, 0.0, 0.0)
     n = len(scenario.assembly)
     covariance = np.diag([deviation_mm * 1e-3] * 3 + [radians(deviation_deg)] * 3) ** 2
     return Observation(

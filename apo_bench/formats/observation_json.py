@@ -25,8 +25,8 @@ from apo_bench.formats.json_forms import (
     pose_form,
 )
 from apo_bench.geometry import Array
-from apo_bench.io import Finite, NotNegative, Positive, Table, Text, Triple, convert_typed, read_typed
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.io import FileTable, Finite, NotNegative, Positive, Text, Triple, convert_typed, read_typed
+from apo_bench.scenario import Scenario, place_layout
 
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
 _LEAST_FREEDOM = 0.4
@@ -58,7 +58,7 @@ class ObservedOperation(PlannedOperation, frozen=True, kw_only=True):
     deviation_deg: Annotated[float, Meta(ge=1e-4, le=180.0)] | UnsetType = UNSET
 
 
-class SharedForm(Table, frozen=True, kw_only=True):
+class SharedForm(FileTable, frozen=True, kw_only=True):
     """An error that operations share; without a frame its twist is in the frame of each part."""
 
     name: Text
@@ -69,7 +69,7 @@ class SharedForm(Table, frozen=True, kw_only=True):
     correlation: list[list[Finite]] | UnsetType = UNSET
 
 
-class TailsForm(Table, frozen=True, kw_only=True):
+class TailsForm(FileTable, frozen=True, kw_only=True):
     """How errors are distributed: four numbers each, across and along the ray, tilt and turn about it."""
 
     axes: list[tuple[Triple, Triple, Triple]]
@@ -83,13 +83,13 @@ class TailsForm(Table, frozen=True, kw_only=True):
 OutliersForm = msgspec.defstruct(
     "OutliersForm",
     [*((key, float, UNSET) for key in _RATES), ("camera_mm", Position, UNSET)],
-    bases=(Table,),
+    bases=(FileTable,),
     kw_only=True,
 )
 """How often observations are worse than they state; what is left out is as usual."""
 
 
-class ObservationForm(Table, frozen=True, kw_only=True):
+class ObservationForm(FileTable, frozen=True, kw_only=True):
     """An observation; what is left out of `start`, `gap_mm` and `play_mm` is as in its scenario."""
 
     schema: Literal["apo-bench/observation/2"]
@@ -186,7 +186,7 @@ def read_json_observation(
         f"{file}, scenario: the file is of '{form.scenario}', not of '{scenario.name}'; give a file of that scenario.",
     )
     _check_operations(file, form.operations, assembly)
-    usual_start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
+    usual_start = place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
     poses = [entry.matrix(f"{file}, operation {entry.operation}") for entry in form.operations]
     observation = Observation(
         assembly=assembly,

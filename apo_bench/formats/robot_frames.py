@@ -7,7 +7,7 @@ from typing import Literal, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io import Table, read_typed
+from apo_bench.io import FileTable, read_typed
 from apo_bench.scenario.values import AnyPose
 
 
@@ -23,7 +23,7 @@ class RobotFrames:
     quaternion: Literal["xyzw", "wxyz"] = "xyzw"
 
 
-class RobotTable(Table, frozen=True, kw_only=True):
+class RobotTable(FileTable, frozen=True, kw_only=True):
     """What stands in the file."""
 
     schema: Literal["apo-bench/robot/1"]

@@ -23,7 +23,7 @@ _MOST_ANSWERS = 16
 """Answers that are kept of one object; further ones are worked out each time."""
 
 
-def real(value: ArrayLike) -> Array:
+def copy_real(value: ArrayLike) -> Array:
     """A float64 copy of `value`.
 
     Raises:
@@ -36,7 +36,7 @@ def real(value: ArrayLike) -> Array:
     return np.array(array, dtype=np.float64)
 
 
-def frozen(value: ArrayLike, *shape: int | None) -> Array:
+def copy_frozen(value: ArrayLike, *shape: int | None) -> Array:
     """A read-only float64 copy of `value`.
 
     Args:
@@ -46,7 +46,7 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
         ArgumentError: It holds no numbers, the shape differs, or a number is complex or not finite.
     """
     try:
-        array = real(value)
+        array = copy_real(value)
     except ArgumentError:
         raise
     except (TypeError, ValueError):
@@ -67,11 +67,11 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
     """Have fields of a frozen dataclass hold read-only copies of what they were given; those that are None stay so.
 
     Args:
-        shapes: Field -> the shape of its array, as in `frozen`, or of each array in it, if it is a mapping; None: it is
-            a mapping of other things.
+        shapes: Field -> the shape of its array, as in `copy_frozen`, or of each array in it, if it is a mapping;
+            None: it is a mapping of other things.
 
     Raises:
-        ArgumentError: An array is not as `frozen` needs it, with the name of the field.
+        ArgumentError: An array is not as `copy_frozen` needs it, with the name of the field.
     """
     for name, shape in shapes.items():
         value = getattr(record, name)
@@ -79,15 +79,15 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
             continue
         try:
             if isinstance(value, Mapping):
-                kept = value if shape is None else {key: frozen(each, *shape) for key, each in value.items()}
+                kept = value if shape is None else {key: copy_frozen(each, *shape) for key, each in value.items()}
                 object.__setattr__(record, name, MappingProxyType(dict(kept)))
             elif shape is not None:
-                object.__setattr__(record, name, frozen(value, *shape))
+                object.__setattr__(record, name, copy_frozen(value, *shape))
         except ArgumentError as error:
             raise ArgumentError(f"{name} of {type(record).__name__}: {error}.") from None
 
 
-def copyable(record: type[Record]) -> type[Record]:
+def make_copyable(record: type[Record]) -> type[Record]:
     """Have a frozen dataclass copied and pickled through its constructor: what it holds is read-only in the copy too.
 
     A read-only mapping cannot be pickled by itself, and an array that was pickled can be written to.
@@ -102,7 +102,7 @@ def _reduced(record: Any) -> tuple[Any, ...]:
     return partial(record.__class__, **plain), ()
 
 
-def remembered(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+def remember(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """Keep what a function of an object, and of plain values, returned, for as long as the object lives.
 
     For objects that are compared by identity and never change. What is returned is shared, so it must not be changed.

@@ -3,9 +3,9 @@
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.hull import Hull, cylinder_hull
-from apo_bench.geometry.polygon import flat_area, plane_across
+from apo_bench.geometry.arrays import Array, remember
+from apo_bench.geometry.hull import Hull, make_cylinder_hull
+from apo_bench.geometry.polygon import find_plane_across, make_flat_area
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
@@ -21,7 +21,7 @@ _THINNEST_M = 5e-5
 must contain a ball of this radius."""
 
 
-def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
+def shrink_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     """The pieces of the part as it is made, same names and order; those that recede to nothing, if they are hardly any
     of it, are left out.
 
@@ -44,9 +44,9 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     return recede_pieces(solid, clearance_m) if solid.fits else solid.pieces
 
 
-@remembered
+@remember
 def recede_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """`physical_pieces` of a part that fits; among pieces other than boxes, a box is taken as one of them.
+    """`shrink_pieces` of a part that fits; among pieces other than boxes, a box is taken as one of them.
 
     By less than nothing they come forward.
     """
@@ -130,7 +130,7 @@ def _recede_cylinder(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
         raise _swallowed(solid, hull, clearance_m)
     middle = center + (ends[0] + ends[1]) / 2 * axis
     changed = hull.cylinder._replace(center=middle, radius=radius, half_length=(ends[1] - ends[0]) / 2)
-    return cylinder_hull(hull.name, changed)
+    return make_cylinder_hull(hull.name, changed)
 
 
 def _swallowed(solid: Solid, hull: Hull, clearance_m: float) -> InputError:
@@ -181,9 +181,9 @@ def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
     n = side[:3]
     if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - side[3]) > _ON_M:
         return False
-    to_plane = plane_across(n)
+    to_plane = find_plane_across(n)
     own = MultiPoint(_corners_on(piece, side) @ to_plane).convex_hull
-    return bool(own.intersection(flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * own.area)
+    return bool(own.intersection(make_flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * own.area)
 
 
 def _corners_on(piece: Piece, side: Array) -> Array:

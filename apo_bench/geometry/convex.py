@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, copy_frozen
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece
 
@@ -15,7 +15,7 @@ _PARALLEL = 1e-6
 """Edges whose cross product is shorter give no direction of their own."""
 
 
-def shadow(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
+def project_on_axes(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
     """The middles and half lengths, (k,) each, of the shadow of a piece on axes of the world, its frame at the origin.
 
     Args:
@@ -31,7 +31,7 @@ def shadow(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
     return own @ piece.center, np.abs(own) @ piece.half
 
 
-def separating_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
+def find_separating_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """The directions, (k, 3), along which two pieces may be apart: across sides, and across an edge of each."""
     return np.concatenate([across_sides(a, R_a, b, R_b), across_edges(a, R_a, b, R_b)])
 
@@ -65,7 +65,7 @@ def _cross(edges_a: Array, edges_b: Array) -> Array:
     return np.asarray(crossed[kept] / length[kept, None])
 
 
-def passage(planes: Array, start: Array, way: Array) -> tuple[Array, Array]:
+def measure_passage(planes: Array, start: Array, way: Array) -> tuple[Array, Array]:
     """How far rays go until they enter a convex piece, and until they leave it, (*,) each; inf and -inf if they miss.
 
     Args:
@@ -85,16 +85,18 @@ def passage(planes: Array, start: Array, way: Array) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=1024)
-def all_corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
+def collect_corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
     """The corners of all pieces, (k, 3), in the frame of their solid, [m], and where those of each begin."""
     corners = [piece.corners for piece in pieces]
-    return frozen(np.concatenate(corners), None, 3), np.cumsum([0, *map(len, corners[:-1])])
+    return copy_frozen(np.concatenate(corners), None, 3), np.cumsum([0, *map(len, corners[:-1])])
 
 
 @lru_cache(maxsize=1024)
 def boxes_around(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     """Centres and half sizes, (k, 3) each, of boxes or of those around pieces, in the frame of their solid, [m]."""
-    return frozen([piece.center for piece in pieces], None, 3), frozen([piece.half for piece in pieces], None, 3)
+    return copy_frozen([piece.center for piece in pieces], None, 3), copy_frozen(
+        [piece.half for piece in pieces], None, 3
+    )
 
 
 def boxes_reach(a: tuple[Piece, ...], R_a: Array, b: tuple[Piece, ...], R_b: Array, axes: Array) -> Array:
@@ -105,17 +107,17 @@ def boxes_reach(a: tuple[Piece, ...], R_a: Array, b: tuple[Piece, ...], R_b: Arr
 
 
 @lru_cache(maxsize=4096)
-def ball_around(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
+def enclose_in_ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
     """Middle, (3,), of the box around all pieces, in the frame of their solid, and half its diagonal, [m]."""
     centers, halves = boxes_around(pieces)
     low = (centers - halves).min(axis=0)
     high = (centers + halves).max(axis=0)
-    return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
+    return copy_frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
 
 
-def balls_apart(a: tuple[Piece, ...], T_a: Array, b: tuple[Piece, ...], T_b: Array) -> float:
+def measure_ball_distance(a: tuple[Piece, ...], T_a: Array, b: tuple[Piece, ...], T_b: Array) -> float:
     """How far the balls around all pieces of two posed solids are apart, [m]; negative where they overlap."""
-    middle_a, radius_a = ball_around(a)
-    middle_b, radius_b = ball_around(b)
+    middle_a, radius_a = enclose_in_ball(a)
+    middle_b, radius_b = enclose_in_ball(b)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     return float(np.sqrt(between @ between)) - radius_a - radius_b

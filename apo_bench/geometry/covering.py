@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import are_corners
+from apo_bench.geometry.polygon import find_corners
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
@@ -38,7 +38,7 @@ class Overlap:
 NO_OVERLAP = Overlap(np.zeros((0, 3)), 0.0)
 
 
-class Laid(NamedTuple):
+class FacePair(NamedTuple):
     """A face that is laid on another one."""
 
     face: Face
@@ -51,7 +51,7 @@ class Laid(NamedTuple):
     """World pose of that solid, (4, 4), [m]."""
 
 
-def overlaps(laid: Sequence[Laid]) -> list[Overlap]:
+def compute_overlaps(laid: Sequence[FacePair]) -> list[Overlap]:
     """Project faces along the normals of others onto their planes and clip them there (Section 2.2, Fc of Fig. 1).
 
     Concave outlines, holes and several pieces are allowed. How far the planes are apart does not matter. One call for
@@ -68,9 +68,9 @@ def overlaps(laid: Sequence[Laid]) -> list[Overlap]:
     points, ring = shapely.get_coordinates(rings, return_index=True)
     once = np.append(ring[1:] == ring[:-1], False)[: len(ring)]
     points, ring = points[once], ring[once]
-    kept = are_corners(points, ring)
+    kept = find_corners(points, ring)
     points, owner = points[kept], common.owners[piece[ring[kept]]]
-    T = np.array([T_on @ plane_frame(on) for _, _, on, T_on in laid]).reshape(-1, 4, 4)[owner]
+    T = np.array([T_on @ make_plane_frame(on) for _, _, on, T_on in laid]).reshape(-1, 4, 4)[owner]
     corners = (T[:, :3, :2] @ points[:, :, None])[:, :, 0] + T[:, :3, 3]
     corners.setflags(write=False)
     ends = np.searchsorted(owner, np.arange(len(laid) + 1))
@@ -80,17 +80,17 @@ def overlaps(laid: Sequence[Laid]) -> list[Overlap]:
     ]
 
 
-def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
-    """The overlap of one pair of faces; the arguments are those of `Laid`."""
-    return overlaps([Laid(face, T_face, on, T_on)])[0]
+def compute_overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
+    """The overlap of one pair of faces; the arguments are those of `FacePair`."""
+    return compute_overlaps([FacePair(face, T_face, on, T_on)])[0]
 
 
-def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+def compute_overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     """The area of `overlap` alone, [m^2]."""
-    return float(_intersect([Laid(face, T_face, on, T_on)]).areas[0])
+    return float(_intersect([FacePair(face, T_face, on, T_on)]).areas[0])
 
 
-def shares(reached: Sequence[Overlap], true: Sequence[Overlap]) -> Array:
+def compute_shares(reached: Sequence[Overlap], true: Sequence[Overlap]) -> Array:
     """How much of each true overlap is covered by the one that was reached on the same lower face, (k,), 0 to 1.
 
     1 where the true one is empty.
@@ -103,15 +103,15 @@ def shares(reached: Sequence[Overlap], true: Sequence[Overlap]) -> Array:
     return np.divide(covered, whole, out=np.ones(len(whole)), where=whole > 0.0)
 
 
-def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+def measure_lateral_gap(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     """How far `face`, projected onto the plane of `on`, lies off it, [m]; 0 if one covers some of the other."""
-    return float(_project([face], (_into_plane(on) @ pose.inverse(T_on) @ T_face)[None])[0].distance(own_shape(on)))
+    return float(_project([face], (_into_plane(on) @ pose.inverse(T_on) @ T_face)[None])[0].distance(flatten_face(on)))
 
 
 @lru_cache(maxsize=4096)
-def face_area(face: Face) -> float:
+def measure_face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
-    return float(own_shape(face).area)
+    return float(flatten_face(face).area)
 
 
 class _Common(NamedTuple):
@@ -127,7 +127,7 @@ class _Common(NamedTuple):
     """(p,), the pair that each piece belongs to."""
 
 
-def _intersect(laid: Sequence[Laid]) -> _Common:
+def _intersect(laid: Sequence[FacePair]) -> _Common:
     import shapely
 
     # Everything in the plane of `on`, z along its normal: there dropping heights projects along the normal.
@@ -137,7 +137,7 @@ def _intersect(laid: Sequence[Laid]) -> _Common:
     normals = np.array([each.face.normal for each in laid]).reshape(-1, 3)
     seen = (np.abs((T[:, 2, :3] * normals).sum(axis=1)) >= _EDGE_ON).nonzero()[0]
     shapes = np.full(len(laid), None, dtype=object)
-    lower = np.array([own_shape(laid[i].on) for i in seen], dtype=object)
+    lower = np.array([flatten_face(laid[i].on) for i in seen], dtype=object)
     shapes[seen] = shapely.intersection(_project([laid[i].face for i in seen], T[seen]), lower)
     pieces, owners = shapely.get_parts(shapes, return_index=True)
     areas = shapely.area(pieces)
@@ -169,18 +169,18 @@ def _rings(face: Face) -> tuple[Array, tuple[int, ...]]:
 
 
 @lru_cache(maxsize=4096)
-def own_shape(face: Face) -> Any:
+def flatten_face(face: Face) -> Any:
     """The face in its own plane, a shapely polygon."""
     return _project([face], _into_plane(face)[None])[0]
 
 
 @lru_cache(maxsize=4096)
 def _into_plane(face: Face) -> Array:
-    return pose.inverse(plane_frame(face))
+    return pose.inverse(make_plane_frame(face))
 
 
 @lru_cache(maxsize=4096)
-def plane_frame(face: Face) -> Array:
+def make_plane_frame(face: Face) -> Array:
     """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]

@@ -65,7 +65,7 @@ def fills_the_same(solid: Solid, g: Array, within_m: float) -> bool:
         left = deepest < -within_m
         if not left.any():
             return True
-        deepest[left] = np.maximum(deepest[left], depth_inside(piece, points[left]))
+        deepest[left] = np.maximum(deepest[left], measure_depth_inside(piece, points[left]))
     return bool((deepest >= -within_m).all())
 
 
@@ -76,7 +76,7 @@ def _points(piece: Piece) -> Array:
     return np.concatenate([corners, middle + 0.9 * (corners - middle), middle + 0.5 * (corners - middle), middle[None]])
 
 
-def depth_inside(piece: Piece, points: Array) -> Array:
+def measure_depth_inside(piece: Piece, points: Array) -> Array:
     """How deep points, (k, 3), are inside a piece, (k,), [m]; negative outside."""
     if isinstance(piece, Hull):
         planes = piece.planes

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.exact_turns import depth_inside
-from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.arrays import Array, remember
+from apo_bench.geometry.exact_turns import measure_depth_inside
+from apo_bench.geometry.polygon import find_direction_across
 from apo_bench.geometry.solid import Piece, Solid
-from apo_bench.geometry.symmetry import revolution, symmetries, turn_about
+from apo_bench.geometry.symmetry import find_revolution, find_symmetries, make_turn
 
 LEAST_SHARE = 0.7
 """A turned part that covers less of itself is not mistaken."""
@@ -32,11 +32,11 @@ class Flips(NamedTuple):
     shares: Array
     """(m,), the part of its volume that the turned part covers."""
     exact: NDArray[np.bool_]
-    """(m,), whether the turn is one of `symmetries`: nothing can be observed then, but contacts name other faces."""
+    """(m,), whether the turn is one of `find_symmetries`: nothing is observed then, but contacts name other faces."""
 
 
-@remembered
-def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Flips:
+@remember
+def find_approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Flips:
     """The turns by 90 and 180 degrees with which a solid covers at least this share of its own volume.
 
     They are about its box axes, or its principal axes where these are others, through the centre of volume. The share
@@ -48,13 +48,13 @@ def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Fl
         least_share: From 0 to 1.
     """
     points, weights = _points(solid)
-    body = revolution(solid)
+    body = find_revolution(solid)
     if body is None:
         axes = _axes(solid)
-        turns = np.array([turn_about(solid.centroid, axis, angle) for axis in axes for angle in _TURNS_RAD])
+        turns = np.array([make_turn(solid.centroid, axis, angle) for axis in axes for angle in _TURNS_RAD])
     else:
-        turns = turn_about(body.point, across_axis(body.axis), np.pi)[None]
-    exact = np.abs(turns[:, None] - symmetries(solid)).max(axis=(2, 3)).min(axis=1) < _SAME
+        turns = make_turn(body.point, find_direction_across(body.axis), np.pi)[None]
+    exact = np.abs(turns[:, None] - find_symmetries(solid)).max(axis=(2, 3)).min(axis=1) < _SAME
     shares = np.ones(len(turns))
     turned = np.concatenate([np.zeros((0, 3)), *(pose.apply(F, points) for F in turns[~exact])])
     # Share = volume of the points that lie in the part after the turn, over the volume of all points.
@@ -99,5 +99,5 @@ def _inside(piece: Piece, points: Array) -> NDArray[np.bool_]:
     """Which points, (k, 3), are in a piece, (k,); only those in the box around it are compared with its planes."""
     near = np.flatnonzero((np.abs(points - piece.center) <= piece.half + _SAME).all(axis=1))
     inside = np.zeros(len(points), dtype=np.bool_)
-    inside[near] = depth_inside(piece, points[near]) >= -_SAME
+    inside[near] = measure_depth_inside(piece, points[near]) >= -_SAME
     return inside

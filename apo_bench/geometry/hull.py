@@ -6,8 +6,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
-from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.arrays import Array, copy_frozen, freeze, make_copyable
+from apo_bench.geometry.polygon import find_direction_across
 
 SAGITTA_M = 5e-6
 """A round wall is stood for by flat ones that are nowhere farther from it."""
@@ -16,7 +16,7 @@ _FLAT = 1e-7
 """Normals of triangles, and directions of edges, are the same within this."""
 
 
-def sides_of(radius_m: float) -> int:
+def count_sides(radius_m: float) -> int:
     """Into how many sides, an even number, a round wall is cut: r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
     return max(FEWEST_SIDES, 2 * int(np.ceil(np.pi / np.arccos(radius_m / (radius_m + SAGITTA_M)) / 2.0)))
 
@@ -33,7 +33,7 @@ class Cylinder(NamedTuple):
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Hull:
     """The smallest convex piece that contains its corners, in the frame of its solid."""
@@ -50,12 +50,12 @@ class Hull:
     @cached_property
     def center(self) -> Array:
         """The middle of the box around it, (3,), [m]."""
-        return frozen((self.corners.min(axis=0) + self.corners.max(axis=0)) / 2, 3)
+        return copy_frozen((self.corners.min(axis=0) + self.corners.max(axis=0)) / 2, 3)
 
     @cached_property
     def half(self) -> Array:
         """Half the size of the box around it, (3,), [m]."""
-        return frozen((self.corners.max(axis=0) - self.corners.min(axis=0)) / 2, 3)
+        return copy_frozen((self.corners.max(axis=0) - self.corners.min(axis=0)) / 2, 3)
 
     @cached_property
     def planes(self) -> Array:
@@ -63,12 +63,12 @@ class Hull:
         from scipy.spatial import ConvexHull
 
         planes = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
-        return frozen(planes[first_of_each(planes[:, :3], signed=True)], None, 4)
+        return copy_frozen(planes[find_distinct_directions(planes[:, :3], signed=True)], None, 4)
 
     @cached_property
     def normals(self) -> Array:
         """Directions across its sides, (s, 3), each once up to its sign."""
-        return frozen(self.planes[first_of_each(self.planes[:, :3]), :3], None, 3)
+        return copy_frozen(self.planes[find_distinct_directions(self.planes[:, :3]), :3], None, 3)
 
     @cached_property
     def edges(self) -> Array:
@@ -81,14 +81,14 @@ class Hull:
         pairs = np.argwhere(np.triu(both >= 2, k=1))
         along = np.cross(n[pairs[:, 0]], n[pairs[:, 1]])
         along /= np.linalg.norm(along, axis=1)[:, None]
-        return frozen(along[first_of_each(along)], None, 3)
+        return copy_frozen(along[find_distinct_directions(along)], None, 3)
 
 
-def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
+def make_cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
     """A cylinder as a piece: a prism whose corners lie on its edges."""
-    n = sides_of(cylinder.radius)
+    n = count_sides(cylinder.radius)
     z = cylinder.axis
-    x = across_axis(z)
+    x = find_direction_across(z)
     # The corners of both ends: a ring of n points about the axis.
     angle = 2.0 * np.pi * np.arange(n) / n
     ring = cylinder.radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.cross(z, x)))
@@ -96,7 +96,7 @@ def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
     return Hull(name, np.concatenate(ends), cylinder)
 
 
-def first_of_each(directions: Array, signed: bool = False) -> Array:
+def find_distinct_directions(directions: Array, signed: bool = False) -> Array:
     """Row numbers of unit vectors, (k, 3), none of which is another one of them, or its opposite."""
     cosine = directions @ directions.T
     alike = (cosine if signed else np.abs(cosine)) > 1.0 - _FLAT

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.covering import NO_OVERLAP, Overlap, own_shape, plane_frame
+from apo_bench.geometry.covering import NO_OVERLAP, Overlap, flatten_face, make_plane_frame
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 
@@ -52,7 +52,7 @@ class Mate:
         return float(max(np.sqrt((self.off * self.off).sum(axis=1)).max(), abs(self.rise_m) * self.sine))
 
 
-def mate(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Mate:
+def measure_mate(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Mate:
     """Measure two faces that can make a contact, of which at least one is round.
 
     Args:
@@ -87,7 +87,7 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
         common = _unroll([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
     rise, sine = _rise(b, T_b, a, T_a) if b.kind == "cone" else (0.0, 0.0)
-    angle = angle_between(u, v) if b.kind == "cone" else _between(u, v)
+    angle = measure_angle(u, v) if b.kind == "cone" else _between(u, v)
     length = max(0.0, float(high - low))
     return Mate(points, _across(points - origin, along), v, angle, rise, sine, common, length)
 
@@ -105,7 +105,7 @@ def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
     over = fits and float(np.linalg.norm(off)) < rim.radius
     common = _unroll([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NO_OVERLAP
-    return Mate(points, off, v, angle_between(u, v), rise, sine, common, 0.0)
+    return Mate(points, off, v, measure_angle(u, v), rise, sine, common, 0.0)
 
 
 def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of_plane: bool) -> Mate:
@@ -117,7 +117,7 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
     ends = pose.apply(T_shaft, shaft.ends)
     n = T_flat[:3, :3] @ flat.normal
     axis = T_shaft[:3, :3] @ shaft.axis
-    flat_ends = pose.apply(pose.inverse(T_flat @ plane_frame(flat)), ends)[:, :2]
+    flat_ends = pose.apply(pose.inverse(T_flat @ make_plane_frame(flat)), ends)[:, :2]
     lines = _lines(flat_ends, flat) if _reaches(shaft, T_shaft, n) else []
     at = np.array(lines).reshape(-1) if lines else np.array([0.0, 1.0])
     points = ends[0] + np.outer([at.min(), at.max()], ends[1] - ends[0])
@@ -147,7 +147,7 @@ def _across(v: Array, axis: Array) -> Array:
     return np.asarray(v - (v @ axis)[..., None] * axis)
 
 
-def angle_between(u: Array, v: Array) -> float:
+def measure_angle(u: Array, v: Array) -> float:
     """The angle between two vectors, (3,), exact also where the cosine is flat, [rad]."""
     return math.atan2(_length_of_cross(u, v), u @ v)
 
@@ -169,7 +169,7 @@ def _reaches(shaft: RoundFace, T: Array, n: Array) -> bool:
     if shaft.toward is None or shaft.extent_rad >= WHOLE_TURN:
         return True
     down = _across(-n, T[:3, :3] @ shaft.axis)
-    return angle_between(down, T[:3, :3] @ shaft.toward) <= shaft.extent_rad / 2 + _EDGE_ON
+    return measure_angle(down, T[:3, :3] @ shaft.toward) <= shaft.extent_rad / 2 + _EDGE_ON
 
 
 def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
@@ -180,7 +180,7 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
     # A line that stands on the face covers nothing of it.
     if way @ way < _EDGE_ON**2 * 1e-6:
         return []
-    covered = LineString(ends).intersection(own_shape(flat))
+    covered = LineString(ends).intersection(flatten_face(flat))
     pieces = [
         piece
         for piece in getattr(covered, "geoms", (covered,))

@@ -6,7 +6,7 @@ from typing import Any
 from apo_bench.geometry.solid import Box, Piece
 
 
-def union_mesh(pieces: Iterable[Piece]) -> Any:
+def build_union_mesh(pieces: Iterable[Piece]) -> Any:
     """A mesh of trimesh; vertices stay apart where the surface touches itself."""
     import manifold3d
     import trimesh

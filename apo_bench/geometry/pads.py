@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_corners, passage
+from apo_bench.geometry.convex import collect_corners, measure_passage
 from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.polygon import plane_across
-from apo_bench.geometry.solid import Piece, Solid, extent
+from apo_bench.geometry.polygon import find_plane_across
+from apo_bench.geometry.solid import Piece, Solid, measure_extent
 
 PAD_M = (0.016, 0.010, 0.026)
 """How far pads reach from between their tips: to each side, down and up, [m]."""
@@ -66,7 +66,7 @@ class _Rays(NamedTuple):
     high: Array
 
 
-def held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> tuple[float, float] | None:
+def measure_held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> tuple[float, float] | None:
     """From where to where the part reaches between pads that close on a point, [m] from it; None: nothing is there.
 
     Pads that close on the gap between two arms of a part press these towards each other.
@@ -89,22 +89,22 @@ def held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array)
 
 
 @lru_cache(maxsize=4096)
-def held_width(
+def measure_held_width(
     pieces: tuple[Piece, ...], point: tuple[float, ...], across: tuple[float, ...], up: tuple[float, ...]
 ) -> float | None:
     """Half of the width of what pads hold that close on a point, [m]; None if there is nothing between them."""
-    span = held_span(pieces, np.array(point), np.array(across), np.array(up))
+    span = measure_held_span(pieces, np.array(point), np.array(across), np.array(up))
     return None if span is None else (span[1] - span[0]) / 2
 
 
 def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
     """Whether pads hold all the width of a part, not an arm of it, nor the air next to it."""
-    low, high = extent(pieces, across)
-    own = held_width(pieces, tuple(point), tuple(across), tuple(up))
+    low, high = measure_extent(pieces, across)
+    own = measure_held_width(pieces, tuple(point), tuple(across), tuple(up))
     return own is not None and own > (high - low) / 2 - _LESS_M
 
 
-def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[PadPlace, ...]:
+def find_holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[PadPlace, ...]:
     """Places at which a gripper from above can hold a part, the best first: near the centre of mass, and not too low.
 
     Args:
@@ -119,7 +119,7 @@ def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tup
 
 
 def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: float) -> bool:
-    """Whether pads that close on a point lie flat on the part, or on a shaft; arguments as in `holds`."""
+    """Whether pads that close on a point lie flat on the part, or on a shaft; arguments as in `find_holds`."""
     along = np.cross(up, across)
     t, h, here = (float(point @ axis) for axis in (along, up, across))
     for rim in (0.0, _RAY_M):  # what is just below the pads may join what they hold, or be in their way
@@ -150,9 +150,9 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 def _places(
     solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float, ray_m: float
 ) -> tuple[PadPlace, ...]:
-    """`holds`, with rows of rays so far apart, [m]."""
+    """`find_holds`, with rows of rays so far apart, [m]."""
     up = np.array(vertical)
-    bottom, top = extent(solid.pieces, up)
+    bottom, top = measure_extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
     least, step = (_LINE_M, _RAY_M) if over_m <= _PINCH_M else (_FINE_M, _PINCH_RAY_M)
     heights = _lines(bottom, max(top + over_m, best), [best], step)
@@ -160,7 +160,7 @@ def _places(
     candidates: list[tuple[float, PadPlace]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
-        low, high = extent(solid.pieces, along)
+        low, high = measure_extent(solid.pieces, along)
         t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
         level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
         rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
@@ -179,7 +179,7 @@ def _directions(solid: Solid, up: Array) -> Iterator[Array]:
     ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
     for face in (face for face in solid.rounds.values() if not face.hole and face.kind == "cylinder"):
         if abs(face.axis @ up) > 1.0 - _LEVEL:
-            x, y = (np.asarray(axis - (axis @ up) * up) for axis in plane_across(up).T)
+            x, y = (np.asarray(axis - (axis @ up) * up) for axis in find_plane_across(up).T)
             ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
         else:
             ways.append(np.cross(up, face.axis))
@@ -203,7 +203,7 @@ def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M
 def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
     """Send rays along a direction through all places of a grid, each way in rising order."""
     along = np.cross(up, across)
-    corners, first = all_corners(pieces)
+    corners, first = collect_corners(pieces)
     (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
     met = np.flatnonzero((t0 < t1) & (h0 < h1))
     T, H = np.meshgrid(t, h)
@@ -212,7 +212,7 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     rays, lows, highs = [np.zeros(0, dtype=np.intp)], [np.zeros(0)], [np.zeros(0)]
     for i in met:
         here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
-        enter, leave = passage(pieces[i].planes, start[here].reshape(-1, 3), across)
+        enter, leave = measure_passage(pieces[i].planes, start[here].reshape(-1, 3), across)
         hit = np.isfinite(enter)
         rays.append(number[here].ravel()[hit])
         lows.append(enter[hit])

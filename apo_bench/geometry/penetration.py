@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, copy_frozen
 from apo_bench.geometry.convex import (
     across_edges,
     across_sides,
-    all_corners,
-    balls_apart,
     box_axes,
     boxes_around,
     boxes_reach,
-    separating_axes,
-    shadow,
+    collect_corners,
+    find_separating_axes,
+    measure_ball_distance,
+    project_on_axes,
 )
 from apo_bench.geometry.solid import Piece, Solid, all_boxes
 
@@ -45,18 +45,18 @@ class WaysOut(NamedTuple):
     """(3,): the middle of the smaller piece, world, [m]."""
 
 
-def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
+def measure_intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """The depth of the deepest pair of pieces of two posed solids, [m]; 0 if they are apart or only touch.
 
     Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    if balls_apart(a.pieces, T_a, b.pieces, T_b) > _TOUCHING_M:
+    if measure_ball_distance(a.pieces, T_a, b.pieces, T_b) > _TOUCHING_M:
         return 0.0
-    return max(0.0, float(intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b, 0.0)[0]))
+    return max(0.0, float(measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b, 0.0)[0]))
 
 
-def intrusion_depths(
+def measure_intrusion_depths(
     a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
 ) -> Array:
     """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
@@ -80,7 +80,7 @@ def intrusion_depths(
     return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
 
 
-def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
+def find_ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
     """Of each pair of pieces of two posed solids that are deeper in each other, how they may be taken apart."""
     R_a = T_a[:3, :3]
     R_b = T_b[:3, :3]
@@ -97,9 +97,9 @@ def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Itera
     between = pose.apply(T_a, balls_a)[:, None] - pose.apply(T_b, balls_b)[None]
     near = np.sqrt((between * between).sum(axis=-1)) < radii_a[:, None] + radii_b
     for own, other in ((a.pieces[i], b.pieces[j]) for i, j in np.argwhere(near)):
-        axes = separating_axes(own, R_a, other, R_b)
-        middle_a, half_a = shadow(own, R_a, axes)
-        middle_b, half_b = shadow(other, R_b, axes)
+        axes = find_separating_axes(own, R_a, other, R_b)
+        middle_a, half_a = project_on_axes(own, R_a, axes)
+        middle_b, half_b = project_on_axes(other, R_b, axes)
         along = axes @ (T_a[:3, 3] - T_b[:3, 3]) + middle_a - middle_b
         depths = half_a + half_b - np.abs(along)
         if depths.min() > deep_m:
@@ -114,8 +114,8 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
 def _piece_by_piece(
     a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
 ) -> Array:
-    """`intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by how far
-    these are apart.
+    """`measure_intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by
+    how far these are apart.
 
     No pair is deeper than its balls and boxes are in each other, nor than it is across its sides alone, so most need
     not be looked at.
@@ -202,7 +202,7 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
-    corners, first = all_corners(pieces)
+    corners, first = collect_corners(pieces)
     turned = corners @ R.T
     low = np.minimum.reduceat(turned, first)
     high = np.maximum.reduceat(turned, first)
@@ -211,8 +211,8 @@ def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
 
 def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
     """How deep one piece is in another one along some axes, at k places, (k,), [m]; infinite along none."""
-    middle_a, half_a = shadow(a, R_a, axes)
-    middle_b, half_b = shadow(b, T_b[:3, :3], axes)
+    middle_a, half_a = project_on_axes(a, R_a, axes)
+    middle_b, half_b = project_on_axes(b, T_b[:3, :3], axes)
     apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
     return np.asarray((half_a + half_b - apart).min(axis=-1, initial=np.inf))
 
@@ -222,10 +222,10 @@ def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     """Middles, (k, 3), and radii, (k,), of balls around pieces, in the frame of their solid."""
     corners = [piece.corners for piece in pieces]
     radii = [np.linalg.norm(c - p.center, axis=1).max() for c, p in zip(corners, pieces, strict=True)]
-    return frozen([piece.center for piece in pieces], None, 3), frozen(radii, None)
+    return copy_frozen([piece.center for piece in pieces], None, 3), copy_frozen(radii, None)
 
 
-def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
+def measure_upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
     """The lowest and the highest corner, (3,) each, of the box around posed pieces whose sides are those of the world.
 
     Args:
@@ -233,7 +233,7 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
         at: (3,), the place of their frame, [m].
     """
     if not all_boxes(pieces):
-        corners = all_corners(pieces)[0] @ R.T + at
+        corners = collect_corners(pieces)[0] @ R.T + at
         return corners.min(axis=0), corners.max(axis=0)
     centers, halves = boxes_around(pieces)
     middle = centers @ R.T + at
@@ -241,10 +241,10 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
     return (middle - reach).min(axis=0), (middle + reach).max(axis=0)
 
 
-def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
+def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """How far `a` can go straight down until it meets `b`, to 2 um, [m]; infinite if it passes it by."""
-    low_a, high_a = upright_bounds(a.pieces, T_a[:3, :3], T_a[:3, 3])
-    low_b, high_b = upright_bounds(b.pieces, T_b[:3, :3], T_b[:3, 3])
+    low_a, high_a = measure_upright_bounds(a.pieces, T_a[:3, :3], T_a[:3, 3])
+    low_b, high_b = measure_upright_bounds(b.pieces, T_b[:3, :3], T_b[:3, 3])
     if not ((low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2]):
         return np.inf
     # Between the first and the last way at which the boxes around both may meet: first coarsely, then between the last
@@ -273,7 +273,7 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
     for begin in range(0, len(ways), count):
         here = at[begin : begin + count]
         if pairs is None:
-            depths = intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
+            depths = measure_intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
         else:
             depths = _measure(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0)
         met = np.flatnonzero(depths > TOUCH_M)
@@ -282,6 +282,6 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
     return None
 
 
-def drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
+def measure_drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
     """How deep `a` is in `b` once it went down so far, (k,), [m]; negative where they are apart."""
-    return intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0)), b.pieces, T_b)
+    return measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0)), b.pieces, T_b)

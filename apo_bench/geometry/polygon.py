@@ -12,35 +12,35 @@ _STRAIGHT_M = 1e-9
 """A point this near to the line through its neighbours is no corner."""
 
 
-def across_axis(axis: Array, toward: Array | None = None) -> Array:
+def find_direction_across(axis: Array, toward: Array | None = None) -> Array:
     """A unit vector across an axis, (3,): what is across it of a direction; none: of the most so axis of the frame."""
     x = np.eye(3)[int(np.abs(axis).argmin())] if toward is None else toward
     x = x - (x @ axis) * axis
     return np.asarray(x / np.sqrt(x @ x))
 
 
-def plane_across(n: Array) -> Array:
+def find_plane_across(n: Array) -> Array:
     """Two directions across a normal, (3,), as columns, (3, 2): with it they make a right-handed frame."""
-    u = across_axis(n)
+    u = find_direction_across(n)
     return np.column_stack([u, np.cross(n, u)])
 
 
-def flat_area(outline: Array, holes: Sequence[Array], to_plane: Array) -> Any:
+def make_flat_area(outline: Array, holes: Sequence[Array], to_plane: Array) -> Any:
     """Rings of corners, (k, 3) each, as a shapely polygon in the plane of two directions, (3, 2)."""
     from shapely import Polygon
 
     return Polygon(outline @ to_plane, [hole @ to_plane for hole in holes])
 
 
-def polygons_of(shape: Any) -> Iterator[Any]:
+def list_polygons(shape: Any) -> Iterator[Any]:
     """The polygons in a shapely geometry; points and lines are left out."""
     if shape.geom_type == "Polygon":
         yield shape
     for part in getattr(shape, "geoms", ()):
-        yield from polygons_of(part)
+        yield from list_polygons(part)
 
 
-def rings_of(polygon: Any, turned: float | None = None) -> list[Array]:
+def list_rings(polygon: Any, turned: float | None = None) -> list[Array]:
     """The outline of a shapely polygon, then its holes, (k, 2) each, every corner once.
 
     Args:
@@ -57,10 +57,10 @@ def straighten(ring: Array) -> Array:
 
     A sliver, such as a disc seen nearly edge-on, keeps its points where no three corners would be left.
     """
-    return ring[are_corners(ring, np.zeros(len(ring), dtype=np.intp))]
+    return ring[find_corners(ring, np.zeros(len(ring), dtype=np.intp))]
 
 
-def are_corners(points: Array, ring: NDArray[np.intp]) -> NDArray[np.bool_]:
+def find_corners(points: Array, ring: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Which points of closed rings are no points in the middle of straight edges, (k,), as in `straighten`.
 
     Args:

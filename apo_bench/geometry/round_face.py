@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
-from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.arrays import Array, copy_frozen, freeze, make_copyable
+from apo_bench.geometry.polygon import find_direction_across
 
 RoundKind = Literal["cylinder", "cone", "rim"]
 WHOLE_TURN = 2.0 * np.pi
@@ -17,7 +17,7 @@ _SAME_M = 1e-9
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class RoundFace:
     """A piece of a cylinder or a cone, or the circle at its end, in the frame of its solid."""
@@ -67,7 +67,7 @@ class RoundFace:
     @cached_property
     def ends(self) -> Array:
         """Where the axis enters and leaves the face, (2, 3), [m]."""
-        return frozen(self.point + np.outer(self.span, self.axis), 2, 3)
+        return copy_frozen(self.point + np.outer(self.span, self.axis), 2, 3)
 
     @property
     def middle(self) -> Array:
@@ -100,5 +100,5 @@ class RoundFace:
     def frame(self) -> Array:
         """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""
         z = self.axis
-        x = across_axis(z, self.toward)
-        return frozen(pose.rigid(np.column_stack([x, np.cross(z, x), z]), self.point), 4, 4)
+        x = find_direction_across(z, self.toward)
+        return copy_frozen(pose.rigid(np.column_stack([x, np.cross(z, x), z]), self.point), 4, 4)

@@ -7,13 +7,13 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
+from apo_bench.geometry.arrays import Array, copy_frozen, freeze, make_copyable
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.round_face import RoundFace
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Face:
     """A flat polygon, convex or not, with or without holes, that looks outwards along its normal."""
@@ -32,28 +32,28 @@ class Face:
 
     def __post_init__(self) -> None:
         freeze(self, outline=(None, 3))
-        object.__setattr__(self, "holes", tuple(frozen(hole, None, 3) for hole in self.holes))
+        object.__setattr__(self, "holes", tuple(copy_frozen(hole, None, 3) for hole in self.holes))
 
     @cached_property
     def normal(self) -> Array:
         """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
         if self.stated_normal is not None:
-            return frozen(self.stated_normal, 3)
+            return copy_frozen(self.stated_normal, 3)
         # n ~ sum_i c_i x c_i+1: its components are differences of entries of M = sum_i c_i c_i+1^t.
         corners = self.outline - self.outline[0]
         M = corners.T @ np.concatenate([corners[1:], corners[:1]])
         n = np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
-        return frozen(n / np.sqrt(n @ n), 3)
+        return copy_frozen(n / np.sqrt(n @ n), 3)
 
     @cached_property
     def plane(self) -> Array:
         """The face equation (n_x, n_y, n_z, -d) of Eq. 1, (4,), d in [m]."""
         n = self.normal
-        return frozen(np.append(n, -n @ self.outline.mean(axis=0)), 4)
+        return copy_frozen(np.append(n, -n @ self.outline.mean(axis=0)), 4)
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Box:
     """An axis-aligned box in the frame of its solid, [m]."""
@@ -69,13 +69,13 @@ class Box:
     def corners(self) -> Array:
         """(8, 3), [m]."""
         signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
-        return frozen(self.center + signs * self.half, 8, 3)
+        return copy_frozen(self.center + signs * self.half, 8, 3)
 
     @cached_property
     def planes(self) -> Array:
         """Its sides, (6, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
         n = np.concatenate([np.eye(3), -np.eye(3)])
-        return frozen(np.column_stack([n, n @ self.center + np.tile(self.half, 2)]), 6, 4)
+        return copy_frozen(np.column_stack([n, n @ self.center + np.tile(self.half, 2)]), 6, 4)
 
     @property
     def normals(self) -> Array:
@@ -99,7 +99,7 @@ def all_boxes(pieces: tuple[Piece, ...]) -> bool:
     return all(isinstance(piece, Box) for piece in pieces)
 
 
-def extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
+def measure_extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
     """How far pieces reach along a direction, (3,), of their own frame: the least and the greatest coordinate, [m]."""
     ends = [_ends(piece, along) for piece in pieces]
     return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
@@ -115,7 +115,7 @@ def _ends(piece: Piece, along: Array) -> tuple[float, float]:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A rigid part of nominal size: named faces, and the convex pieces whose union it is."""
@@ -154,10 +154,10 @@ class Solid:
         """Lowest and highest corner of the solid, (2, 3), [m]."""
         low = np.min([piece.center - piece.half for piece in self.pieces], axis=0)
         high = np.max([piece.center + piece.half for piece in self.pieces], axis=0)
-        return frozen([low, high])
+        return copy_frozen([low, high])
 
 
-def world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:
+def measure_world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:
     """The lowest and the highest corner, (3,) each, of the box around posed solids, world frame, [m]."""
-    ends = np.array([[np.add(extent(solid.pieces, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
+    ends = np.array([[np.add(measure_extent(solid.pieces, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
     return ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)

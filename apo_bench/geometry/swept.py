@@ -16,13 +16,13 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import (
     across_edges,
     across_sides,
-    all_corners,
-    ball_around,
     box_axes,
     boxes_around,
-    shadow,
+    collect_corners,
+    enclose_in_ball,
+    project_on_axes,
 )
-from apo_bench.geometry.polygon import plane_across
+from apo_bench.geometry.polygon import find_plane_across
 from apo_bench.geometry.solid import Piece, all_boxes
 
 _ROUNDING_M = 1e-9
@@ -31,7 +31,7 @@ _SLACK_M = 5e-5
 _ANYWHERE = (-np.inf, np.inf)
 
 
-class Posed(NamedTuple):
+class PosedPieces(NamedTuple):
     """The pieces of a part somewhere."""
 
     pieces: tuple[Piece, ...]
@@ -40,7 +40,7 @@ class Posed(NamedTuple):
 
 
 def _box_spans(
-    moving: Posed, way: Array, resting: Posed, slack_m: float, within: tuple[float, float] = _ANYWHERE
+    moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, within: tuple[float, float] = _ANYWHERE
 ) -> tuple[NDArray[np.intp], Array]:
     """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
     a, b = (pose.apply(of.T, boxes_around(of.pieces)[0]) for of in (moving, resting))
@@ -55,7 +55,7 @@ def _box_spans(
 
 
 def _side_by_side(
-    moving: Posed, way: Array, resting: Posed, slack_m: float, within: tuple[float, float]
+    moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, within: tuple[float, float]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Pairs of pieces that may meet on a line, (k,) each: their shadows square to it do, and those along it in time."""
     if all_boxes(moving.pieces) and all_boxes(resting.pieces):
@@ -63,7 +63,7 @@ def _side_by_side(
         return every[0], every[1]
     near = np.ones((len(moving.pieces), len(resting.pieces)), dtype=np.bool_)
     room = _ROUNDING_M - min(10.0 * slack_m, 0.0)
-    for axis, (begin, end) in zip((*plane_across(way).T, way), ((0.0, 0.0), (0.0, 0.0), within), strict=True):
+    for axis, (begin, end) in zip((*find_plane_across(way).T, way), ((0.0, 0.0), (0.0, 0.0), within), strict=True):
         (low_a, high_a), (low_b, high_b) = (_ends(of, axis) for of in (moving, resting))
         near &= low_a[:, None] + begin < high_b + room
         near &= high_a[:, None] + end > low_b - room
@@ -71,14 +71,14 @@ def _side_by_side(
     return i, j
 
 
-def _ends(of: Posed, axis: Array) -> tuple[Array, Array]:
+def _ends(of: PosedPieces, axis: Array) -> tuple[Array, Array]:
     """From where to where each piece is along an axis, (k,) each."""
-    corners, first = all_corners(of.pieces)
+    corners, first = collect_corners(of.pieces)
     along = corners @ (of.T[:3, :3].T @ axis) + of.T[:3, 3] @ axis
     return np.minimum.reduceat(along, first), np.maximum.reduceat(along, first)
 
 
-def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: int) -> Array:
+def _exactly(moving: PosedPieces, way: Array, resting: PosedPieces, slack_m: float, pair: int) -> Array:
     """Where the pieces of a pair meet, (1, 2), or nowhere, (0, 2): across their sides, then across edges."""
     a, b = (of.pieces[i] for of, i in zip((moving, resting), divmod(pair, len(resting.pieces)), strict=True))
     R_a = moving.T[:3, :3]
@@ -86,8 +86,8 @@ def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: in
     between = moving.T[:3, 3] - resting.T[:3, 3]
 
     def meet(axes: Array) -> Array:
-        middle_a, half_a = shadow(a, R_a, axes)
-        middle_b, half_b = shadow(b, R_b, axes)
+        middle_a, half_a = project_on_axes(a, R_a, axes)
+        middle_b, half_b = project_on_axes(b, R_b, axes)
         at = middle_a - middle_b + axes @ between
         reach = half_a + half_b - slack_m
         return _intervals(at[None], axes @ way, reach[None])[1]
@@ -101,7 +101,7 @@ def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: in
     return np.array([[low, high]]) if low < high else np.zeros((0, 2))
 
 
-def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
+def is_way_free(moving: Sequence[PosedPieces], way: Array, length_m: float, resting: Sequence[PosedPieces]) -> bool:
     """Whether parts can be moved so far as one without coming into any other."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
@@ -123,14 +123,14 @@ def _within(spans: Array, length_m: float) -> bool:
     return bool(((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any())
 
 
-def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
+def compute_exit_distance(moving: Sequence[PosedPieces], way: Array, resting: Sequence[PosedPieces]) -> float:
     """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap.
 
     Pieces that are no boxes are compared by the boxes around them first, those that go on the longest before others.
     """
     spans = list[Array]()
     exact = list[bool]()
-    owners = list[tuple[Posed, Posed, int]]()
+    owners = list[tuple[PosedPieces, PosedPieces, int]]()
     for m, r in product(moving, resting):
         pairs, intervals = _box_spans(m, way, r, -_SLACK_M)
         spans += list(intervals)
@@ -152,10 +152,10 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
     return max(0.0, at - _SLACK_M)
 
 
-def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
+def _near(moving: PosedPieces, way: Array, length_m: float, resting: PosedPieces) -> bool:
     """Whether balls around two parts come near each other on the way; most parts are far away."""
-    middle_a, r_a = ball_around(moving.pieces)
-    middle_b, r_b = ball_around(resting.pieces)
+    middle_a, r_a = enclose_in_ball(moving.pieces)
+    middle_b, r_b = enclose_in_ball(resting.pieces)
     a = moving.T[:3, :3] @ middle_a + moving.T[:3, 3]
     b = resting.T[:3, :3] @ middle_b + resting.T[:3, 3]
     passed = float(np.clip((b - a) @ way, 0.0, length_m))

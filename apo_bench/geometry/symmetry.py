@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, copy_frozen
 from apo_bench.geometry.exact_turns import carries_faces, centred_turn, exact_turns, fills_the_same
-from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.polygon import find_direction_across
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid, all_boxes
 
@@ -41,7 +41,7 @@ class Revolution(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def revolution(solid: Solid) -> Revolution | None:
+def find_revolution(solid: Solid) -> Revolution | None:
     """The axis about which a part may be turned by anything; None if it has none.
 
     All round faces are whole and about this axis, flat ones lie across it and are round themselves, and what the pieces
@@ -56,7 +56,7 @@ def revolution(solid: Solid) -> Revolution | None:
         across = abs(face.normal @ about.axis) > 1.0 - _SAME
         if not across or not all(_is_circle(about, loop) for loop in (face.outline, *face.holes)):
             return None
-    turns = [turn_about(about.point, about.axis, angle) for angle in _TURNS]
+    turns = [make_turn(about.point, about.axis, angle) for angle in _TURNS]
     J = solid.inertia
     R = turns[0][:3, :3]
     if J is not None and np.abs(R @ J @ R.T - J).max() > _EVEN * np.trace(J):
@@ -67,26 +67,26 @@ def revolution(solid: Solid) -> Revolution | None:
     return about._replace(reversible=carries_faces(solid, _over(about)))
 
 
-def turn_about(point: Array, axis: Array, angle_rad: float) -> Array:
+def make_turn(point: Array, axis: Array, angle_rad: float) -> Array:
     """The displacement by a turn about an axis through a point, (4, 4)."""
     spin = np.concatenate([np.zeros(3), axis * angle_rad])
     return np.asarray(pose.at(point) @ pose.exp(spin) @ pose.at(-point))
 
 
-def turn_alike(solid: Solid, T: Array, true: Array) -> Array:
+def find_least_turned(solid: Solid, T: Array, true: Array) -> Array:
     """The pose, (4, 4), at which a part of revolution looks as it does at T, turned the least from another pose.
 
     Of that one the rotation (3, 3) is enough; of several, (*, 3, 3), each has a pose, (*, 4, 4). Any other part stays
     as it is.
     """
-    about = revolution(solid)
+    about = find_revolution(solid)
     if about is None:
         return T
     # What is left between the two, M, is to turn the least: of both ways round, the turn about the axis with the
     # greatest trace. The centre of volume stays where it is observed.
     M = np.swapaxes(true[..., :3, :3], -1, -2) @ T[:3, :3]
     a = about.axis
-    across = across_axis(a)
+    across = find_direction_across(a)
     flips = np.array([np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)][: 1 + about.reversible])
     turns = flips @ _least_turn(M[..., None, :, :] @ flips, a)
     traces = np.einsum("...ij,...fji->...f", M, turns)
@@ -115,15 +115,15 @@ def _is_circle(about: Revolution, loop: Array) -> bool:
 
 
 @lru_cache(maxsize=1)
-def quarter_turns() -> Array:
+def list_quarter_turns() -> Array:
     """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
     ways = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
     signed = [np.eye(3)[list(order)] * np.array(signs)[:, None] + 0.0 for order, signs in ways]
-    return frozen([R for R in signed if np.linalg.det(R) > 0.0])
+    return copy_frozen([R for R in signed if np.linalg.det(R) > 0.0])
 
 
 @lru_cache(maxsize=256)
-def symmetries(solid: Solid) -> Array:
+def find_symmetries(solid: Solid) -> Array:
     """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
 
     Fit faces lie on fit faces then, too: a part that recedes on one side only does not look the same from both.
@@ -135,35 +135,35 @@ def symmetries(solid: Solid) -> Array:
     revolution, which has any number of them, those are here that turn its axis: none but the identity, or one more.
     """
     if solid.rounds or not all_boxes(solid.pieces):
-        about = revolution(solid)
-        return frozen(exact_turns(solid) if about is None else [np.eye(4), *[_over(about)] * about.reversible])
+        about = find_revolution(solid)
+        return copy_frozen(exact_turns(solid) if about is None else [np.eye(4), *[_over(about)] * about.reversible])
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
-    kept = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
-    return frozen([g for g in (centred_turn(solid, R) for R in kept) if _keeps_fit(solid, g)])
+    kept = [R for R in list_quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
+    return copy_frozen([g for g in (centred_turn(solid, R) for R in kept) if _keeps_fit(solid, g)])
 
 
 def _over(about: Revolution) -> Array:
     """The turn, (4, 4), that puts a part of revolution upside down."""
-    return turn_about(about.point, across_axis(about.axis), np.pi)
+    return make_turn(about.point, find_direction_across(about.axis), np.pi)
 
 
-def nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
+def find_nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
     """The pose, (4, 4), at which a solid looks as it does at T, turned least away from an expected pose (4, 4).
 
     Of several expected poses, (*, 4, 4), each has a pose. Any turn about an axis of revolution looks the same.
     """
-    if revolution(solid) is not None:
-        return turn_alike(solid, T, expected)
+    if find_revolution(solid) is not None:
+        return find_least_turned(solid, T, expected)
     off = (pose.inverse(expected) @ T).reshape(-1, 4, 4)
-    return np.asarray(T @ nearest_symmetry(symmetries(solid), off).reshape(np.shape(expected)))
+    return np.asarray(T @ nearest_symmetry(find_symmetries(solid), off).reshape(np.shape(expected)))
 
 
-def folds(symmetric: Array) -> Array:
+def count_folds(symmetric: Array) -> Array:
     """How often a part looks the same in a whole turn about each axis of its frame, (3,): 1, 2 or 4.
 
     Args:
-        symmetric: (m, 4, 4), from `symmetries`.
+        symmetric: (m, 4, 4), from `find_symmetries`.
     """
     return np.array([1.0 + sum(R[i, i] == 1.0 for R in symmetric[1:, :3, :3]) for i in range(3)])
 
@@ -179,7 +179,7 @@ def nearest_symmetry(symmetric: Array, off: Array) -> Array:
     return np.asarray(symmetric[np.argmax(close, axis=1)])
 
 
-def nearest_symmetric_pose(T: Array, symmetric: Array, expected: Array) -> Array:
+def find_nearest_symmetric_pose(T: Array, symmetric: Array, expected: Array) -> Array:
     """The pose T g, (4, 4), that looks like T and is turned least away from an expected rotation (3, 3)."""
     poses = T @ symmetric
     return np.asarray(poses[np.einsum("nij,ij->n", poses[:, :3, :3], expected).argmax()])

@@ -58,7 +58,7 @@ _SUM = np.ones(3)
 _POWERS = np.arange(float(_TERMS))
 
 
-def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
+def compute_exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     """exp(xi), (*, 4, 4), and J_r in exp(xi + d) = exp(xi) exp(J_r d + O(d^2)), (*, 6, 6), of twists (*, 6).
 
     The adjoint matrix of a twist satisfies a polynomial of degree five, so four powers of it suffice (Bullo and Murray,
@@ -85,6 +85,6 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     return T, J
 
 
-def right_jacobian(twist: ArrayLike) -> Array:
+def compute_right_jacobian(twist: ArrayLike) -> Array:
     """J_r alone, (*, 6) -> (*, 6, 6)."""
-    return exp_and_jacobian(twist)[1]
+    return compute_exp_and_jacobian(twist)[1]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
-from apo_bench.scenario import Scenario, load_scenario, scenario_path
+from apo_bench.scenario import Scenario, find_scenario_path, load_scenario
 
 
 @check_arguments
@@ -23,15 +23,15 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
     Raises:
         InputError: The file cannot be read, or a solid makes no part.
     """
-    from apo_bench.importers.cad.importing import import_part as write_part
+    from apo_bench.importers.cad.importing import import_solid as write_part
     from apo_bench.importers.cad.importing import raw_solids
-    from apo_bench.importers.cad.solids.naming import part_name
+    from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     written: dict[str, Path] = {}
     for raw in raw_solids(source, unit)[1]:
-        name = part_name(raw.name, set(written))
+        name = make_part_name(raw.name, set(written))
         written[name] = write_part(raw, name, target, source.name).path
     return tuple(written.values())
 
@@ -68,7 +68,7 @@ def import_assembly(
         InputError: A file cannot be read, a solid makes no part, or the scenario file exists.
         RuntimeError: There is no order in which the parts can be assembled.
     """
-    from apo_bench.importers.assembly.from_cad import import_assembly as write_parts
+    from apo_bench.importers.assembly.from_cad import import_parts as write_parts
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
 
     sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
@@ -108,7 +108,7 @@ def check_scenario(scenario: str | Path | Scenario, *, seeds: int = 5, fidelity:
     """
     from apo_bench.importers.assembly.checking import check_file
 
-    source = scenario.source if isinstance(scenario, Scenario) else scenario_path(scenario)
+    source = scenario.source if isinstance(scenario, Scenario) else find_scenario_path(scenario)
     require(source is not None, "a scenario was given that was not read from a file; give its file.")
     assert source is not None
     return tuple(str(finding.sentence) for finding in check_file(source, seeds, fidelity) if not finding.ok)

@@ -2,11 +2,11 @@
 
 from apo_bench.io.csv_tables import Columns, CsvRow, check_separator, read_csv, write_csv
 from apo_bench.io.documents import (
+    FileTable,
     Finite,
     NotNegative,
     Positive,
     Quadruple,
-    Table,
     Text,
     Triple,
     check_quaternion,
@@ -15,17 +15,17 @@ from apo_bench.io.documents import (
     read_plain,
     read_typed,
 )
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.grouping import grouped
-from apo_bench.io.named_files import named_files
+from apo_bench.io.figures import save_figure, use_figure_style
+from apo_bench.io.grouping import group_by
+from apo_bench.io.named_files import list_named_files
 from apo_bench.io.parquet import has_parquet, write_columns
-from apo_bench.io.processes import SAFE_PATH, environment
+from apo_bench.io.processes import SAFE_PATH, set_environment
 from apo_bench.io.result_files import check_target, open_to_append, replace_file, write_file
-from apo_bench.io.safe_io import decoded, each_line, opened, read_bytes, read_text
-from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
+from apo_bench.io.safe_io import decode_text, open_file, read_bytes, read_lines, read_text
+from apo_bench.io.safe_text import CONTROL, UNSHOWN, clean, escape_markdown, shorten_text
 from apo_bench.io.streams import redirect_output
-from apo_bench.io.text import columns, direction, listed_words, with_article
-from apo_bench.io.toml_text import toml_text
+from apo_bench.io.text import add_the, align_columns, format_direction, join_words
+from apo_bench.io.toml_text import format_toml
 
 __all__ = (
     "CONTROL",
@@ -33,43 +33,43 @@ __all__ = (
     "UNSHOWN",
     "Columns",
     "CsvRow",
+    "FileTable",
     "Finite",
     "NotNegative",
     "Positive",
     "Quadruple",
-    "Table",
     "Text",
     "Triple",
-    "brief",
+    "add_the",
+    "align_columns",
     "check_quaternion",
     "check_separator",
     "check_target",
     "clean",
-    "columns",
     "convert_typed",
-    "decoded",
-    "default_looks",
-    "direction",
-    "each_line",
-    "environment",
-    "grouped",
+    "decode_text",
+    "escape_markdown",
+    "format_direction",
+    "format_toml",
+    "group_by",
     "has_parquet",
-    "listed_words",
-    "markdown",
-    "named_files",
+    "join_words",
+    "list_named_files",
+    "open_file",
     "open_to_append",
-    "opened",
     "parse_plain",
     "read_bytes",
     "read_csv",
+    "read_lines",
     "read_plain",
     "read_text",
     "read_typed",
     "redirect_output",
     "replace_file",
     "save_figure",
-    "toml_text",
-    "with_article",
+    "set_environment",
+    "shorten_text",
+    "use_figure_style",
     "write_columns",
     "write_csv",
     "write_file",

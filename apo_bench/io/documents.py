@@ -42,7 +42,7 @@ _WORDS = {
 }
 
 
-class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class FileTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of a file: its fields are the keys that it may have, those without a default the ones it must have."""
 
 

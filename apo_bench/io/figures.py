@@ -10,7 +10,7 @@ from apo_bench.io.result_files import replace_file
 
 
 @contextmanager
-def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
+def use_figure_style(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
     """Matplotlib with its own settings, and with these, while something is drawn; those of before come back.
 
     Text is drawn letter by letter: `$` in the name of a method begins no formula. A function that draws has this as a

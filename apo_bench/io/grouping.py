@@ -7,7 +7,7 @@ K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+def group_by(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
     """Group values by their keys; both keep the order in which they came."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:

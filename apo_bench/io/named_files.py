@@ -13,7 +13,7 @@ _MODELS = ("include", "model")
 _LARGEST_BYTES = 100_000_000
 
 
-def named_files(mjcf: Path) -> tuple[Path, ...]:
+def list_named_files(mjcf: Path) -> tuple[Path, ...]:
     """An MJCF file and every file that it names, as far as they are there, in the order in which they are named.
 
     MuJoCo looks for a file in one folder only; a file of that name in another stated folder counts as well.

@@ -9,7 +9,7 @@ SAFE_PATH = "PYTHONSAFEPATH"
 
 
 @contextmanager
-def environment(variables: Mapping[str, str]) -> Iterator[None]:
+def set_environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Add variables to the environment of processes that are started meanwhile."""
     before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)

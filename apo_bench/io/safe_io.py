@@ -13,7 +13,7 @@ LARGEST_BYTES = 1_000_000
 
 
 @contextmanager
-def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
+def open_file(path: str | Path, kind: str) -> Iterator[BinaryIO]:
     """An ordinary file, or a link to one, to read from.
 
     Args:
@@ -46,7 +46,7 @@ def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes
     Raises:
         InputError: It is no ordinary file, cannot be opened, or is larger than the limit.
     """
-    with opened(path, kind) as file:
+    with open_file(path, kind) as file:
         content = file.read(limit + 1)
     require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give {add_article(kind)}.")
     return content
@@ -58,20 +58,20 @@ def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
     Raises:
         InputError: It cannot be read, is larger than the limit, or is not UTF-8.
     """
-    return decoded(read_bytes(path, kind, limit), str(path), kind)
+    return decode_text(read_bytes(path, kind, limit), str(path), kind)
 
 
-def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
+def read_lines(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
     """The lines of a file, numbered from 1; a last one without an end, torn as it was written, is left out.
 
     Raises:
         InputError: It is no ordinary file, or cannot be read.
     """
-    with opened(path, kind) as file:
+    with open_file(path, kind) as file:
         yield from ((number, line) for number, line in enumerate(file, start=1) if line.endswith(b"\n"))
 
 
-def decoded(raw: bytes, file: str, kind: str) -> str:
+def decode_text(raw: bytes, file: str, kind: str) -> str:
     """The text in bytes, without a byte order mark; `file` is their name in messages."""
     try:
         return raw.decode("utf-8-sig")

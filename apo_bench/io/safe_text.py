@@ -20,7 +20,7 @@ _MARKDOWN = re.compile(r"[&<>\\`*\[\]{}|$~]|(?<![^\W_])_|_(?![^\W_])")
 """What has a meaning in Markdown or HTML inside a line: underscores do at the ends of a word."""
 
 
-def markdown(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """One line that Markdown shows as it is, in a cell of a table or behind other text.
 
     Every character with a meaning becomes a character reference, which begins neither markup nor HTML in any renderer.
@@ -28,6 +28,6 @@ def markdown(text: str) -> str:
     return _MARKDOWN.sub(lambda match: f"&#{ord(match[0])};", " ".join(clean(text).split()))
 
 
-def brief(text: str) -> str:
+def shorten_text(text: str) -> str:
     """Without the middle of what is too long to be read."""
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"

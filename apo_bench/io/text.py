@@ -7,24 +7,24 @@ import numpy as np
 from apo_bench.geometry import Array
 
 
-def with_article(part: str) -> str:
+def add_the(part: str) -> str:
     """`the stick`, but `castle2` and `A`."""
     return part if part[-1].isdigit() or part[0].isupper() else f"the {part}"
 
 
-def listed_words(words: Iterable[str]) -> str:
+def join_words(words: Iterable[str]) -> str:
     """`x`, `x and y`, `x, y and yaw`; empty if there are none."""
     *most, last = [*words] or [""]
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def columns(table: Sequence[Sequence[str]]) -> list[str]:
+def align_columns(table: Sequence[Sequence[str]]) -> list[str]:
     """Rows of equal length as lines, their entries below each other."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in table]
 
 
-def direction(v: Array) -> str:
+def format_direction(v: Array) -> str:
     """`-z`, or three numbers."""
     for i, axis in enumerate("xyz"):
         if abs(v[i]) > 1.0 - 1e-9:

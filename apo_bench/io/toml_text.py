@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 
-def toml_text(document: Mapping[str, Any]) -> str:
+def format_toml(document: Mapping[str, Any]) -> str:
     """Return a document of tables, lists, texts and numbers as TOML.
 
     Args:

@@ -9,14 +9,14 @@ from apo_bench.assembly import (
     Assembly,
     Contact,
     ContactKind,
-    Lie,
+    Meeting,
     Meetings,
     Poses,
-    apart_limit_mm,
-    contact_kind,
-    deep_limit_mm,
+    classify_contact,
+    compute_apart_limit_mm,
+    compute_deep_limit_mm,
 )
-from apo_bench.geometry import Array, Mate, Overlap, shares
+from apo_bench.geometry import Array, Mate, Overlap, compute_shares
 from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]
@@ -91,12 +91,12 @@ class ContactJudge(NamedTuple):
 
     def verdicts(self, cases: Sequence[ContactCase]) -> tuple[ContactVerdict, ...]:
         """Measure contacts, all in one call."""
-        found = self.known.lies((c.contact, poses) for c in cases for poses in (c.poses, c.true))
+        found = self.known.measure((c.contact, poses) for c in cases for poses in (c.poses, c.true))
         common = [each.common if isinstance(each, Mate) else each for each in found]
-        shares = covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
+        shares = compute_covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
         return tuple(self._verdict(*each) for each in zip(cases, found[::2], shares.tolist(), strict=True))
 
-    def _verdict(self, case: ContactCase, lie: Lie, covered: float) -> ContactVerdict:
+    def _verdict(self, case: ContactCase, lie: Meeting, covered: float) -> ContactVerdict:
         limits = self.thresholds
         contact = case.contact
         gaps, angle = _measure(self.known.assembly, contact, case.poses, lie)
@@ -114,17 +114,17 @@ class ContactJudge(NamedTuple):
             covering=covering,
             loose=near and covering,
             allowed_mm=allowed,
-            kind=contact_kind(*map(self.known.assembly.face_of, contact)) or "plane on plane",
+            kind=classify_contact(*map(self.known.assembly.face_of, contact)) or "plane on plane",
         )
 
     def _nearest_limit(self, case: ContactCase, gaps: Gaps | None) -> tuple[float, float | None]:
         """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
-        deep = deep_limit_mm(self.known.assembly, case.contact, *lengths)
+        deep = compute_deep_limit_mm(self.known.assembly, case.contact, *lengths)
         # faces may be farther apart than deep, so the smaller gap of the two needs no other limit
         if gaps is None or gaps.apart_mm <= gaps.deep_mm:
             return deep, None if gaps is None else gaps.deep_mm
-        apart = apart_limit_mm(self.known.assembly, case.contact, case.operation, case.true, *lengths)
+        apart = compute_apart_limit_mm(self.known.assembly, case.contact, case.operation, case.true, *lengths)
         return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
 
 
@@ -148,7 +148,7 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
         yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
 
 
-def covered_shares(reached: Sequence[Overlap], true: Sequence[Overlap], anywhere: Sequence[bool]) -> Array:
+def compute_covered_shares(reached: Sequence[Overlap], true: Sequence[Overlap], anywhere: Sequence[bool]) -> Array:
     """How much of each true overlap is covered by the one that was reached, (k,), 0 to 1; 1 where the true is empty.
 
     Args:
@@ -157,7 +157,7 @@ def covered_shares(reached: Sequence[Overlap], true: Sequence[Overlap], anywhere
     area, whole = (np.array([overlap.area for overlap in of]) for of in (reached, true))
     out = np.minimum(1.0, np.divide(area, whole, out=np.ones(len(whole)), where=whole > 0.0))
     placed = [i for i, at_all in enumerate(anywhere) if not at_all]
-    out[placed] = shares([reached[i] for i in placed], [true[i] for i in placed])
+    out[placed] = compute_shares([reached[i] for i in placed], [true[i] for i in placed])
     return out
 
 
@@ -165,7 +165,7 @@ def _when(verdict: ContactVerdict) -> str:
     return f" after operation {verdict.operation + 1}" if verdict.moment == "made" else ""
 
 
-def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Lie) -> tuple[Gaps | None, float]:
+def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Meeting) -> tuple[Gaps | None, float]:
     """What is between the faces, and the angle between the normals or axes [degrees].
 
     Round faces are off, not apart or deep.

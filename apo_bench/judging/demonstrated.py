@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Reached, Snapshot, placements
+from apo_bench.assembly import Assembly, ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import ContactCase, ContactJudge, ContactMoment, ContactVerdict
 from apo_bench.judging.displaced import displacements
@@ -12,7 +12,7 @@ from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
 
 
-def judge_demonstrated(judge: ContactJudge, reached: Reached, reference: Array) -> Judgement:
+def judge_demonstrated(judge: ContactJudge, reached: ReachedState, reference: Array) -> Judgement:
     """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
 
     At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
@@ -49,7 +49,7 @@ def _contacts_when_made(
     if first is None:
         return ()
     # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
-    true = placements(judge.known.assembly, first.poses, reference)
+    true = compute_placements(judge.known.assembly, first.poses, reference)
     cases = []
     for contact, made, lost in judge.known.assembly.relations():
         moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
@@ -75,7 +75,7 @@ def _pushes(
             put.update({part: at[part] for part in moved})
 
 
-def _corners_at_end(assembly: Assembly, reached: Reached) -> Iterator[tuple[str, float]]:
+def _corners_at_end(assembly: Assembly, reached: ReachedState) -> Iterator[tuple[str, float]]:
     """How far a corner of each part that is no fixture lies at most from where its last operation had put it, [m]."""
     if reached.final is not None:
         yield from displacements(assembly, reached.after, reached.final, fixtures(assembly))

@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Meetings, Poses, Snapshot, corners, touched_contacts
-from apo_bench.geometry import Array, Solid, pose, turn_alike
+from apo_bench.assembly import Assembly, Contact, Meetings, Poses, Snapshot, find_touch_points, find_touched_contacts
+from apo_bench.geometry import Array, Solid, find_least_turned, pose
 
 _ONE_WAY = 0.999
 """Cosine between the normals of faces that look the same way: together they are a plain support."""
@@ -37,7 +37,7 @@ def displacements(
         if put is not None and part not in away:
             solid = assembly.solids[part]
             at = _corners(solid)
-            T = turn_alike(solid, final.poses[part], put.poses[part])
+            T = find_least_turned(solid, final.poses[part], put.poses[part])
             yield part, _farthest(pose.apply(T, at) - pose.apply(put.poses[part], at))
 
 
@@ -90,7 +90,7 @@ def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str]
 
 def _is_mate(assembly: Assembly, contacts: Sequence[Contact], part: str, seen: Poses) -> bool:
     """Whether contacts with fixed parts hold a part in more than one direction."""
-    normals = np.array([touched.normal for touched in touched_contacts(assembly, contacts, [part], seen)])
+    normals = np.array([touched.normal for touched in find_touched_contacts(assembly, contacts, [part], seen)])
     return len(normals) > 0 and float((normals @ normals[0]).min()) < _ONE_WAY
 
 
@@ -110,8 +110,8 @@ def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, 
 def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
     """The pose of b in the frame of a, as it looks, with parts of revolution turned about their axes the least."""
     for _ in range(_PASSES):
-        now = turn_alike(b, now, before)
-        now = pose.inverse(turn_alike(a, pose.inverse(now), pose.inverse(before)))
+        now = find_least_turned(b, now, before)
+        now = pose.inverse(find_least_turned(a, pose.inverse(now), pose.inverse(before)))
     return now
 
 
@@ -121,7 +121,9 @@ def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], 
     Args:
         T: The pose of the first part, in whose frame the twists are.
     """
-    points, normals = corners(known.assembly, touched_contacts(known.assembly, contacts, [parts[1]], seen), seen, known)
+    points, normals = find_touch_points(
+        known.assembly, find_touched_contacts(known.assembly, contacts, [parts[1]], seen), seen, known
+    )
     p = pose.apply(pose.inverse(T), points)
     n = normals @ T[:3, :3]
     return np.concatenate([n, np.cross(p, n)], axis=1)

@@ -4,14 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Meetings, Poses, Reached, Relation, placements
-from apo_bench.geometry import Array, nearest_alike
-from apo_bench.judging.contacts import ContactCase, ContactJudge, covered_shares
+from apo_bench.assembly import Assembly, Contact, Meetings, Poses, ReachedState, Relation, compute_placements
+from apo_bench.geometry import Array, find_nearest_alike
+from apo_bench.judging.contacts import ContactCase, ContactJudge, compute_covered_shares
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 
 
-def judge_finished(judge: ContactJudge, reached: Reached, reference: Array) -> Judgement:
+def judge_finished(judge: ContactJudge, reached: ReachedState, reference: Array) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
     The contacts that stand at the end are needed. A part may have been put in by any of its symmetries: the one
@@ -32,15 +32,13 @@ def judge_finished(judge: ContactJudge, reached: Reached, reference: Array) -> J
         return judgement((), (), (), judge.thresholds, all_made=False)
     away = fixtures(assembly)
     limits = judge.thresholds
-    true = placements(assembly, final.poses, reference)[-1]
+    true = compute_placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
+    moved = faults_of_place(judge.known, reached.after, final, away, seen, limits.displaced_mm)
     return judgement(
         judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],
-        [
-            (what, 1e3 * m)
-            for what, m in faults_of_place(judge.known, reached.after, final, away, seen, limits.displaced_mm)
-        ],
+        [(what, 1e3 * m) for what, m in moved],
         limits,
         all_made=all_made,
         disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
@@ -86,14 +84,14 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
         Not a number where faces that should touch do not meet in the truth itself, so that it cannot be one.
     """
     contacts = [(contact, anywhere) for contact, _, anywhere in _standing(assembly, fixtures(assembly))]
-    true = placements(assembly, final, references.swapaxes(0, 1))[-1]
+    true = compute_placements(assembly, final, references.swapaxes(0, 1))[-1]
     seen = _as_meant(assembly, final, true)
     count = len(references)
-    common = Meetings(assembly).overlaps(
+    common = Meetings(assembly).measure_overlaps(
         ((c, at) for each in (seen, true) for at in _one_by_one(each, count) for c, _ in contacts),
     )
     reached, expected = common[: len(common) // 2], common[len(common) // 2 :]
-    covered = covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
+    covered = compute_covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
     covered[[not overlap for overlap in expected]] = np.nan
     return np.asarray(covered.reshape(count, -1).min(axis=1, initial=1.0))
 
@@ -107,6 +105,6 @@ def _one_by_one(poses: Poses, count: int) -> list[Poses]:
 def _as_meant(assembly: Assembly, poses: Poses, true: Poses) -> Poses:
     """Poses of parts turned by that of their symmetries which is nearest to the truth, or to each of several truths."""
     return {
-        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
+        part: T if part in assembly.fixed else find_nearest_alike(assembly.solids[part], T, true[part])
         for part, T in poses.items()
     }

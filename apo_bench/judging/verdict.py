@@ -6,8 +6,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Meetings, Reached, Snapshot
-from apo_bench.geometry import Array, frozen
+from apo_bench.assembly import Assembly, Meetings, ReachedState, Snapshot
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.judging.contacts import ContactJudge
 from apo_bench.judging.demonstrated import judge_demonstrated
 from apo_bench.judging.finished import judge_finished
@@ -19,27 +19,28 @@ from apo_bench.records import Criteria, Meaning
 @check_arguments
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an assembly succeeded, by both rules."""
+    """Whether an assembly succeeded, by the rule for the finished assembly and by the rule for every contact."""
 
     meaning: Meaning
+    """The rule that decides `success`: `assembled` or `as_demonstrated`."""
     finished: Judgement
-    """The judgement of the end: what a person says who sees the finished assembly."""
+    """The judgement of the finished assembly."""
     demonstrated: Judgement
-    """The judgement of every contact when it was made, too: what a person says who watched the demonstration."""
+    """The judgement of every contact at the time at which it was made."""
 
     @property
     def success(self) -> bool:
-        """The finished assembly is right; where the scenario says so, it was made as demonstrated, too."""
+        """Whether the trial succeeded by the rule that the scenario names (`meaning`)."""
         return self.as_demonstrated if self.meaning == "as_demonstrated" else self.finished.holds
 
     @property
     def as_demonstrated(self) -> bool:
-        """The finished assembly is right, and each contact was made when and where it was shown."""
+        """Whether the finished assembly is right and each contact was made when and where it was demonstrated."""
         return self.finished.holds and self.demonstrated.holds
 
     @property
     def loose_success(self) -> bool:
-        """Every contact that `success` needs is there within millimetres and degrees; implied by `success`."""
+        """Whether every contact that `success` needs holds within 5 mm and 5 degrees; `success` implies it."""
         return self.rests_on.loose
 
     @property
@@ -50,17 +51,22 @@ class Verdict:
 
 
 @check_arguments
-def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Criteria) -> Verdict:
-    """Judge what was reached.
+def judge(assembly: Assembly, reached: ReachedState, reference: Array, criteria: Criteria) -> Verdict:
+    """Judge the state that a replay reached.
 
     Args:
-        reached: Snapshots after each operation and at the end. One that is missing, or whose poses are not finite,
-            fails the assembly.
-        reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, how far
-            apart faces may be, and which of a part's symmetries is meant.
+        assembly: Solids, operations and contacts.
+        reached: Snapshots after each operation and at the end. A missing snapshot, or one with poses that are not
+            finite, fails the assembly.
+        reference: (n, 4, 4), the true target poses, world frame, [m]. They state the size of every overlap, the
+            allowed distance of faces, and the symmetry of a part that is meant.
+        criteria: Thresholds, clearance and rule; `Scene.criteria` has those of a scene.
+
+    Returns:
+        Both judgements, with faults and numbers.
     """
-    reference = frozen(reference, len(assembly), 4, 4)
-    sound = Reached(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
+    reference = copy_frozen(reference, len(assembly), 4, 4)
+    sound = ReachedState(after=tuple(map(_drop_non_finite, reached.after)), final=_drop_non_finite(reached.final))
     contacts = ContactJudge(Meetings(assembly), criteria.thresholds, criteria.clearance_mm)
     return Verdict(
         criteria.success_means,

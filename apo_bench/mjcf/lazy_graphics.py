@@ -11,7 +11,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from apo_bench.io import environment
+from apo_bench.io import set_environment
 
 _VARIABLE = "MUJOCO_GL"
 _NO_BACKEND = {_VARIABLE: "disable"}
@@ -21,7 +21,7 @@ def import_mujoco() -> None:
     """Import MuJoCo; `mujoco.GLContext` is there at its first use."""
     if "mujoco" in sys.modules:
         return
-    with environment(_NO_BACKEND):
+    with set_environment(_NO_BACKEND):
         mujoco = importlib.import_module("mujoco")
     contexts = importlib.import_module("mujoco.rendering.classic.gl_context")
     for module in (contexts, mujoco, importlib.import_module("mujoco.gl_context")):

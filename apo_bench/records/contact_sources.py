@@ -30,7 +30,7 @@ SHIFT_MM = 2.0
 _LARGEST_SHIFT_MM = 50.0
 
 
-def contact_source_name(text: str) -> str:
+def normalise_contact_source(text: str) -> str:
     """The canonical name of a contact source: `shifted` is `shifted:2`, `shifted:3.0` is `shifted:3`.
 
     Raises:
@@ -54,7 +54,7 @@ def contact_source_name(text: str) -> str:
 def checked_contact_source(text: str) -> str:
     """The canonical name of a contact source; raise an `InputError` if there is no such source."""
     require_text("contact source", text)
-    name = contact_source_name(text)
+    name = normalise_contact_source(text)
     require(
         name.partition(":")[0] not in _KINDS or name in _KINDS or name.startswith("shifted:"),
         f"the contact source '{text}' was given; only shifted has a size, as in shifted:3.",

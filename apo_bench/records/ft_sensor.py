@@ -38,7 +38,7 @@ _MOST = FtNoise(10.0, 5.0)
 """A touch ends at six standard deviations of a reading, 13.5 N with such a sensor; 14 N is a collision."""
 
 
-def ft_noise(name: str) -> FtNoise:
+def parse_ft_noise(name: str) -> FtNoise:
     """The noise of a sensor.
 
     Raises:
@@ -62,12 +62,12 @@ def ft_noise(name: str) -> FtNoise:
     return FtNoise(force, torque)
 
 
-def checked_ft_sensor(name: str) -> str:
+def normalise_ft_sensor(name: str) -> str:
     """The canonical name of a sensor: a preset where one has its noise, else numbers that read back as they are.
 
     Raises:
-        InputError: As in `ft_noise`.
+        InputError: As in `parse_ft_noise`.
     """
-    noise = ft_noise(name)
+    noise = parse_ft_noise(name)
     known = next((preset for preset, its in _PRESETS.items() if its == noise), None)
     return known or "/".join(repr(x).removesuffix(".0") for x in noise)

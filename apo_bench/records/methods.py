@@ -121,7 +121,7 @@ def affects(setting: str, method: str) -> bool:
     return setting not in _AFFECTED_BY or _AFFECTED_BY[setting](method)
 
 
-def with_simulated(corrector: Any) -> Any:
+def resolve_simulated(corrector: Any) -> Any:
     """What to pass to `correct`: the function, where a name stands for a corrector that needs a simulator."""
     known = isinstance(corrector, str) and corrector in SIMULATED
     return resolve(corrector, SIMULATED, "corrector") if known else corrector

@@ -61,11 +61,11 @@ _TOUCHING = MappingProxyType(
 """The same of a robot that feels, before it takes a part."""
 
 
-def touching_sentence(code: str, *, part: str = "") -> str:
+def describe_touch(code: str, *, part: str = "") -> str:
     """The sentence of a code of the stage `touch`, which is of no operation."""
     return _TOUCHING[code].format(part=part)
 
 
-def sentence(code: str, *, part: str = "", operation: int = 0) -> str:
+def describe_outcome(code: str, *, part: str = "", operation: int = 0) -> str:
     """The sentence of a code; `operation` counted from 0."""
     return CODES[code].format(part=part, operation=operation + 1)

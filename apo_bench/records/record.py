@@ -42,7 +42,7 @@ class FreeMoved(TypedDict):
     deg: _Size
 
 
-class MovedInHand(TypedDict):
+class GraspSlip(TypedDict):
     """An operation, and how far its part moved in the hand after the grasp, [mm] and [deg]."""
 
     operation: _Operation
@@ -54,7 +54,7 @@ class MovedInHand(TypedDict):
     """When it was let go of, or the replay failed."""
 
 
-class Predicted(TypedDict):
+class FailurePrediction(TypedDict):
     """The prediction of failure, and how far off the plan is then [mm]."""
 
     fails: bool
@@ -142,7 +142,7 @@ class TrialRecord(_Columns, total=False):
     """Steps of the plan beyond doing every operation once."""
     fit_adjustments: list[FreeMoved] | None
     """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
-    failure_prediction: Predicted | None
+    failure_prediction: FailurePrediction | None
     """The prediction of failure, before the plan is executed."""
     predicted_success: _Share | None
     """Predicted success probability, before the plan is executed; null without a plan."""
@@ -191,7 +191,7 @@ class TrialRecord(_Columns, total=False):
     """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
     peak_force_n: _Size | None
     """Largest contact force on what was held, without the gripper's, behind a low-pass filter of 20 ms [N]."""
-    grasp_slip: list[MovedInHand] | None
+    grasp_slip: list[GraspSlip] | None
     """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
     probe_contacts: _Count | None
     """Probe contacts that the robot used. This and what follows is null for a robot that does not probe."""
@@ -234,7 +234,7 @@ REQUIRED = (
 """Columns without which a line is no record; other columns that are missing are null."""
 
 
-def finite(x: float | None) -> float | None:
+def replace_infinite(x: float | None) -> float | None:
     """A number that a record can hold, else null."""
     return float(x) if x is not None and abs(x) <= LARGEST_NUMBER else None
 
@@ -245,22 +245,22 @@ KEY = tuple(info.name for info in SETTINGS.values() if info.key)
 _KEY_VALUES = itemgetter(*KEY)
 
 
-def record_key(record: Mapping[str, Any]) -> Key:
+def get_record_key(record: Mapping[str, Any]) -> Key:
     """The key of the trial that a record is of."""
     key: Key = _KEY_VALUES(record)
     return key
 
 
-def trial_key(trial: TrialConfig, scenario: str) -> Key:
+def make_trial_key(trial: TrialConfig, scenario: str) -> Key:
     """The key of a trial.
 
     Args:
         scenario: The name of the scenario.
     """
-    return record_key(setting_columns(trial, scenario))
+    return get_record_key(list_setting_columns(trial, scenario))
 
 
-def setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
+def list_setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
     """The settings as they stand in a record.
 
     Args:
@@ -273,7 +273,7 @@ def setting_columns(settings: TrialConfig, scenario: str) -> dict[str, Any]:
     }
 
 
-def settings_of(record: Mapping[str, Any], scenario: str) -> TrialConfig:
+def restore_settings(record: Mapping[str, Any], scenario: str) -> TrialConfig:
     """The settings of the trial that a record is of, without its salt, which no record tells.
 
     Args:
@@ -283,7 +283,7 @@ def settings_of(record: Mapping[str, Any], scenario: str) -> TrialConfig:
     return TrialConfig(**(values | {"scenario": scenario, "secret_seed": None}))
 
 
-def in_python(options: Mapping[str, Any]) -> dict[str, Any]:
+def convert_to_python_units(options: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by their names, in the units of Python, out of those by their options; other names stay."""
     values = dict(options)
     for name, info in SETTINGS.items():

@@ -36,7 +36,7 @@ class Sigmas(NamedTuple):
     in_hand: tuple[float, float] = (0.0, 0.0)
 
 
-def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
+def parse_robot_error(name: str, called: str = "robot error") -> Sigmas:
     """The standard deviations of a name.
 
     Args:
@@ -56,31 +56,31 @@ def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
     return Sigmas(hand_eye, joints[0], tool[0], in_hand)
 
 
-def checked_robot_error(name: str) -> str:
+def normalise_robot_error(name: str) -> str:
     """The canonical name of the robot's errors, `none` if all are zero.
 
     Raises:
-        InputError: As in `robot_sigmas`.
+        InputError: As in `parse_robot_error`.
     """
-    return _spell(robot_sigmas(name))
+    return _spell(parse_robot_error(name))
 
 
-def checked_assumed_robot_error(name: str) -> str:
+def normalise_assumed_robot_error(name: str) -> str:
     """The canonical name of an assumed error.
 
     Raises:
-        InputError: It is neither `matched` nor `unknown`, nor what `robot_sigmas` takes.
+        InputError: It is neither `matched` nor `unknown`, nor what `parse_robot_error` takes.
     """
     require_text("assumed robot error", name)
     if name in (MATCHED, _UNKNOWN):
         return name
     if ":" not in name:
         require_known("assumed robot error", name, (MATCHED, _UNKNOWN, NO_ROBOT_ERROR, *_UNITS))
-    return _spell(robot_sigmas(name, "assumed robot error"))
+    return _spell(parse_robot_error(name, "assumed robot error"))
 
 
-def assumed_error(assumed_robot_error: str, robot_error: str) -> str | None:
-    """The error that a robot assumes, as in `robot_sigmas`; None for usual ones.
+def parse_assumed_error(assumed_robot_error: str, robot_error: str) -> str | None:
+    """The error that a robot assumes, as in `parse_robot_error`; None for usual ones.
 
     Args:
         assumed_robot_error, robot_error: As in records.

@@ -59,7 +59,7 @@ def read_secret_seed(path: str | Path) -> SecretSeed:
     return SecretSeed(secret)
 
 
-def secret_seed_of_sweep(path: str | Path, folder: str | Path) -> SecretSeed:
+def open_secret_seed(path: str | Path, folder: str | Path) -> SecretSeed:
     """The secret seed of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
 
     Raises:
@@ -94,7 +94,7 @@ def _open_privately(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
-def common_secret_seed(records: Iterable[Mapping[str, Any]]) -> str | None:
+def find_common_secret_seed(records: Iterable[Mapping[str, Any]]) -> str | None:
     """The hash of the secret seed that all records were drawn with; None for none.
 
     Raises:

@@ -9,13 +9,13 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.records.contact_sources import checked_contact_source
-from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, checked_ft_sensor
+from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, normalise_ft_sensor
 from apo_bench.records.methods import CORRECTOR, checked_method, probes
 from apo_bench.records.robot_error import (
     MATCHED,
     NO_ROBOT_ERROR,
-    checked_assumed_robot_error,
-    checked_robot_error,
+    normalise_assumed_robot_error,
+    normalise_robot_error,
 )
 from apo_bench.records.secret_seed import SecretSeed
 from apo_bench.records.setting_info import SettingInfo, about
@@ -56,9 +56,14 @@ NOISE_LEVEL = SettingInfo(
 @final
 @dataclass(frozen=True)
 class TrialConfig:
-    """One trial: with the same version and the same files it determines its record.
+    """The settings of one trial; with the same version and files they determine its record.
 
-    A record has these settings as its first columns, in this order.
+    They are the first columns of a record, in this order.
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.TrialConfig("stick_in_tower", noise_mm=0.5, method="contact", seed=7).noise_deg
+        1.0
     """
 
     scenario: Name = field(metadata=about(key=True, axis=True))
@@ -152,7 +157,7 @@ class TrialConfig:
         metadata=about(
             "Standard deviations of the robot's own errors: none, hand_eye:1/0.2 (mm/degrees), joints:0.05 (degrees), "
             "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), or several joined by +",
-            spelled=checked_robot_error,
+            spelled=normalise_robot_error,
             key=True,
             axis=True,
         ),
@@ -198,7 +203,7 @@ class TrialConfig:
         metadata=about(
             "Force-torque sensor of a robot that probes: ideal, wrist, wrist-coarse, joint-torque, or its noise in N "
             "and Nm, 0.1/0.005",
-            spelled=checked_ft_sensor,
+            spelled=normalise_ft_sensor,
             key=True,
             axis=True,
         ),
@@ -210,7 +215,7 @@ class TrialConfig:
         metadata=about(
             "Robot error that a robot that probes assumes: matched (the standard deviations of --robot-error), "
             "unknown, or standard deviations",
-            spelled=checked_assumed_robot_error,
+            spelled=normalise_assumed_robot_error,
             key=True,
             axis=True,
         ),
@@ -310,7 +315,7 @@ def check_grip(probes: bool, *grasps: str) -> None:
     )
 
 
-def noise_pair(noise_level: float | Sequence[float], pose_source: str = NOISE_MODEL) -> tuple[float, float]:
+def parse_noise_level(noise_level: float | Sequence[float], pose_source: str = NOISE_MODEL) -> tuple[float, float]:
     """A noise level in mm and in degrees: one number stands for both, a pair for each; per ray it is one, in mm."""
     is_several = isinstance(noise_level, Iterable) and not isinstance(noise_level, str)
     several: tuple[Any, ...] = tuple(noise_level) if is_several else (noise_level,)  # type: ignore[arg-type]

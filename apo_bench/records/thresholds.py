@@ -40,9 +40,11 @@ class Thresholds:
 @check_arguments
 @dataclass(frozen=True)
 class Criteria:
-    """What the judge decides by: `Scene.criteria` has those of a scene."""
+    """The thresholds and the rule by which the judge decides; `Scene.criteria` has those of a scene."""
 
     thresholds: Thresholds
+    """Lengths in mm, angles in degrees, speeds in mm/s and degrees/s."""
     clearance_mm: float
-    """Per side, of the parts that were used."""
+    """Clearance per side of the parts that were used."""
     success_means: Meaning = "assembled"
+    """`assembled`: the finished assembly is right; `as_demonstrated`: each contact was also made as demonstrated."""

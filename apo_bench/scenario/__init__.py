@@ -1,10 +1,10 @@
 """Scenarios: files, checks and layouts."""
 
-from apo_bench.scenario.attach_lines import nominal_operations
-from apo_bench.scenario.file import is_named, load_scenario, scenario_names, scenario_path
-from apo_bench.scenario.human_error import NOTHING_M, human_error_covariance, spread_error
-from apo_bench.scenario.layout import draw_layout, layout_at, nominal_start
-from apo_bench.scenario.order import in_the_air
+from apo_bench.scenario.attach_lines import list_nominal_operations
+from apo_bench.scenario.file import find_scenario_path, is_named, list_scenario_names, load_scenario
+from apo_bench.scenario.human_error import NOTHING_M, compute_human_error_covariance, spread_error
+from apo_bench.scenario.layout import draw_layout, find_nominal_start, place_layout
+from apo_bench.scenario.order import find_part_in_the_air
 from apo_bench.scenario.play import check_clearance
 from apo_bench.scenario.scenario import Grasp, HumanError, Scenario, Turn
 
@@ -15,15 +15,15 @@ __all__ = (
     "Scenario",
     "Turn",
     "check_clearance",
+    "compute_human_error_covariance",
     "draw_layout",
-    "human_error_covariance",
-    "in_the_air",
+    "find_nominal_start",
+    "find_part_in_the_air",
+    "find_scenario_path",
     "is_named",
-    "layout_at",
+    "list_nominal_operations",
+    "list_scenario_names",
     "load_scenario",
-    "nominal_operations",
-    "nominal_start",
-    "scenario_names",
-    "scenario_path",
+    "place_layout",
     "spread_error",
 )

@@ -10,7 +10,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.planning.insertion.arrival import Arrival
 from apo_bench.planning.insertion.attach import Preference
 from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
-from apo_bench.scenario.layout import nominal_start
+from apo_bench.scenario.layout import find_nominal_start
 from apo_bench.scenario.scenario import Scenario
 
 _THROUGH = 1e-3
@@ -18,10 +18,10 @@ _THROUGH = 1e-3
 
 
 @lru_cache(maxsize=32)
-def nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
+def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
     """The operations of a scenario at its nominal goals."""
     lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, nominal_start(scenario), scenario.goals, lines)
+    return understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, lines)
 
 
 def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
@@ -33,7 +33,7 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
     Raises:
         InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
     """
-    operations = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
+    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, stated)
     for each, preference in zip(operations, stated, strict=True):
         _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in operations))

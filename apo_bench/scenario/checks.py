@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Layout, Poses, contact_kind, height, placements
+from apo_bench.assembly import Contact, Layout, Poses, classify_contact, compute_placements, measure_height
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Face, angle_between, intrusion, mate, overlap, pose
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.order import check_order, in_the_air
+from apo_bench.geometry import Face, compute_overlap, measure_angle, measure_intrusion, measure_mate, pose
+from apo_bench.scenario.layout import place_layout
+from apo_bench.scenario.order import check_order, find_part_in_the_air
 from apo_bench.scenario.play import without_play
 from apo_bench.scenario.scenario import Scenario
 
@@ -39,7 +39,7 @@ class _Case(NamedTuple):
     """Only the site differs from the nominal layout: what moves as one needs no second look."""
 
 
-def check_scenario(scenario: Scenario, file: str) -> None:
+def check_layouts(scenario: Scenario, file: str) -> None:
     """Check the nominal layout, both ends of every `vary`, and the corners of the site.
 
     Raises:
@@ -49,7 +49,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     require(tight is None, f"{file}, operations, contacts: {tight}; make the hole wider, or fit with a clearance.")
     apart: set[_Pair] = set()
     for case in _cases(scenario):
-        stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.poses))
+        stages = (case.layout.start, *compute_placements(scenario.assembly, case.layout.start, case.layout.poses))
         if not case.key:
             check_order(scenario.assembly, stages, file)
         for key, fault in _faults(scenario, case, stages, apart):
@@ -60,29 +60,29 @@ def _cases(scenario: Scenario) -> Iterator[_Case]:
     site = scenario.site
     x, y = site.center_m
     middle = sum(site.yaw_rad) / 2
-    yield _Case(layout_at(scenario, x, y, middle))
+    yield _Case(place_layout(scenario, x, y, middle))
     for i, shift in enumerate(scenario.shifts):
         for length in (shift.low_m, shift.high_m):
             shifts = [length if j == i else 0.0 for j in range(len(scenario.shifts))]
             words = f" when it is varied by {1e3 * length:g} mm"
-            yield _Case(layout_at(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
+            yield _Case(place_layout(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
     for i, turn in enumerate(scenario.turns):
         for angle in (turn.low_rad, turn.high_rad):
             turns = [angle if j == i else 0.0 for j in range(len(scenario.turns))]
             words = f" when it is turned by {np.degrees(angle):g} degrees"
             yield _Case(
-                layout_at(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
+                place_layout(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
             )
     for i, j, yaw in product((-1, 1), (-1, 1), sorted({middle, *site.yaw_rad})):
         x = site.center_m[0] + i * site.spread_m[0]
         y = site.center_m[1] + j * site.spread_m[1]
         words = f" when the site is at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
-        yield _Case(layout_at(scenario, x, y, yaw), "site", words, site_only=True)
+        yield _Case(place_layout(scenario, x, y, yaw), "site", words, site_only=True)
 
 
 def _faults(scenario: Scenario, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
     """All that is wrong in one layout."""
-    airborne = in_the_air(scenario.assembly, case.layout.start)
+    airborne = find_part_in_the_air(scenario.assembly, case.layout.start)
     if airborne is not None:
         part, sentence = airborne
         yield f"parts, {part}, start, at_mm", sentence
@@ -95,7 +95,7 @@ def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
     """Parts that do not turn about the vertical only: the robot does not turn parts over."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
-        tilt = float(np.degrees(angle_between(before[2, :3], stages[k + 1][operation.main][2, :3])))
+        tilt = float(np.degrees(measure_angle(before[2, :3], stages[k + 1][operation.main][2, :3])))
         if tilt > _ANGLE_DEG:
             yield (
                 f"operation {k + 1}, goal, turn_deg",
@@ -120,14 +120,14 @@ def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
     a, b = map(scenario.assembly.face_of, contact)
     T_a, T_b = (poses[of.part] for of in contact)
     if isinstance(a, Face) and isinstance(b, Face):
-        angle = float(np.degrees(angle_between(T_a[:3, :3] @ a.normal, -T_b[:3, :3] @ b.normal)))
-        above = height(a, T_a, b, T_b)
+        angle = float(np.degrees(measure_angle(T_a[:3, :3] @ a.normal, -T_b[:3, :3] @ b.normal)))
+        above = measure_height(a, T_a, b, T_b)
         tilted = f"the faces look {180 - angle:.4g} degrees apart, 180 are needed"
         off = f"the faces are {1e3 * abs(above):.4g} mm {'apart' if above > 0 else 'too deep'}"
-        common = overlap(a, T_a, b, T_b)
+        common = compute_overlap(a, T_a, b, T_b)
     else:
-        touch = mate(a, T_a, b, T_b)
-        angle = 0.0 if contact_kind(a, b) == "cone on rim" else float(np.degrees(touch.angle_rad))
+        touch = measure_mate(a, T_a, b, T_b)
+        angle = 0.0 if classify_contact(a, b) == "cone on rim" else float(np.degrees(touch.angle_rad))
         above = touch.gap_m
         tilted = f"the axes are turned by {angle:.4g} degrees, 0 are needed"
         off = f"the faces are {1e3 * above:.4g} mm off each other"
@@ -160,7 +160,7 @@ def _depth(scenario: Scenario, pair: tuple[str, str], poses: Poses, apart: set[_
     known = (a, b, (np.round(pose.inverse(poses[a]) @ poses[b], 9) + 0.0).tobytes())
     if known in apart:
         return 0.0
-    depth = intrusion(scenario.assembly.solids[a], poses[a], scenario.assembly.solids[b], poses[b])
+    depth = measure_intrusion(scenario.assembly.solids[a], poses[a], scenario.assembly.solids[b], poses[b])
     if depth <= DEEP_M:
         apart.add(known)
     return depth

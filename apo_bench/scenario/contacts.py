@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Gap, PartFace, contact_kind, geometric_play
+from apo_bench.assembly import Contact, Gap, PartFace, classify_contact, compute_geometric_play
 from apo_bench.errors import require, require_known
 from apo_bench.geometry import Face, RoundFace, Solid
 from apo_bench.scenario.tables import ContactTable
@@ -84,7 +84,8 @@ def _check_contact(
     require(below in there, f"{place}, second: '{below}' is not there yet; name a fixed part or one moved before.")
     a, b = (solids[of.part].face(of.face) for of in contact)
     require(
-        contact_kind(a, b) is not None, f"{place}: '{contact}': {_described(a)} and {_described(b)} make no contact."
+        classify_contact(a, b) is not None,
+        f"{place}: '{contact}': {_described(a)} and {_described(b)} make no contact.",
     )
 
 
@@ -103,7 +104,7 @@ def _gap(table: ContactTable, place: str, contact: Contact, solids: Mapping[str,
     """Return how far apart the faces may be."""
     a, b = (solids[of.part].face(of.face) for of in contact)
     if table.gap_mm is None:
-        has_play = a.fit or b.fit or geometric_play(a, b) > 0.0
+        has_play = a.fit or b.fit or compute_geometric_play(a, b) > 0.0
         require(
             table.kind != "clearance" or has_play,
             f"{place}: '{contact}': faces without play have no clearance; say gap_mm = [lowest, highest].",

@@ -13,7 +13,7 @@ from apo_bench.io import convert_typed
 from apo_bench.planning.insertion.attach import Preference
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
-from apo_bench.scenario.parts import load_part, part_path
+from apo_bench.scenario.parts import find_part_path, load_part
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.parts.fit import with_fit
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
@@ -68,7 +68,7 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
         require(table.fixed or not table.follows_site, f"{place}, follows_site: only a fixed part can follow the site.")
         require(table.fixed or table.start, f"{place}: the key 'start' is missing; say where the part stands.")
         try:
-            path = file.parent / part_path(table.file)
+            path = file.parent / find_part_path(table.file)
             if path not in solids:
                 solids[path] = load_part(path, checked)
             solid = with_fit(solids[path], table.fit) if table.fit else solids[path]

@@ -18,45 +18,50 @@ from apo_bench.planning.insertion.attach import Preference
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.attach_lines import with_attach_lines
-from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.checks import check_layouts
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.generated import generated_file, is_generated, whole_name
+from apo_bench.scenario.generated import complete_name, is_generated, make_generated_file
 from apo_bench.scenario.scenario import HumanError, Scenario, Shift, Site, Turn
 from apo_bench.scenario.tables import HumanErrorTable, JudgeTable, ScenarioTable, SiteTable
 from apo_bench.scenario.values import check_span, normalize_axis
 
 
-def scenario_names() -> tuple[str, ...]:
+def list_scenario_names() -> tuple[str, ...]:
     """The short names of the scenarios that come with the package."""
     return tuple(sorted(path.stem for path in folder("scenarios").glob("*.toml")))
 
 
 def is_named(given: str) -> bool:
     """Whether something is the name of a scenario that every installation has, so that no file has to travel."""
-    return is_generated(given) or given in scenario_names()
+    return is_generated(given) or given in list_scenario_names()
 
 
 @check_arguments
 def load_scenario(given: str | Path | Scenario) -> Scenario:
-    """The scenario of a short name, `generated:SEED` or `generated:FAMILY:SEED`, of a TOML file anywhere, or the
-    object itself.
+    """Load a scenario.
 
-    Part files in it are short names, or paths relative to the scenario file. Of a name it is read once.
+    Args:
+        given: A short name (`apo-bench scenario list`), `generated:SEED`, `generated:FAMILY:SEED`, a TOML file, or a
+            `Scenario`, which is returned. Part files are short names, or paths relative to the scenario file.
 
     Raises:
-        InputError: No such scenario, or the file breaks a rule; one sentence with file, key, what was given, what is
-            allowed and what to do.
+        InputError: There is no such scenario, or the file breaks a rule; the sentence names file, key and remedy.
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.load_scenario("stick_in_tower").clearance_mm
+        0.25
     """
     if isinstance(given, Scenario):
         return given
     if isinstance(given, str) and is_named(given):
-        return _load_named(whole_name(given) if is_generated(given) else given)
-    return _read(scenario_path(given))
+        return _load_named(complete_name(given) if is_generated(given) else given)
+    return _read(find_scenario_path(given))
 
 
 @lru_cache(maxsize=128)
 def _load_named(name: str) -> Scenario:
-    return replace(_read(scenario_path(name), checked=not is_generated(name)), name=name)
+    return replace(_read(find_scenario_path(name), checked=not is_generated(name)), name=name)
 
 
 def _read(path: Path, checked: bool = True) -> Scenario:
@@ -66,17 +71,19 @@ def _read(path: Path, checked: bool = True) -> Scenario:
         f"{path}: the file's name, which the scenario gets, holds control characters; rename the file.",
     )
     scenario, stated = _scenario(document, path, checked)
-    check_scenario(scenario, str(path))
+    check_layouts(scenario, str(path))
     return with_attach_lines(scenario, stated, str(path))
 
 
-def scenario_path(given: str | Path) -> Path:
+def find_scenario_path(given: str | Path) -> Path:
     """The file of a scenario, as `load_scenario` finds it; a generated one is written first."""
     if is_generated(given):
-        return generated_file(str(given))
+        return make_generated_file(str(given))
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
-    require_known("scenario", given, scenario_names(), rest=" Or give the path of a .toml file, or generated:SEED.")
+    require_known(
+        "scenario", given, list_scenario_names(), rest=" Or give the path of a .toml file, or generated:SEED."
+    )
     return folder("scenarios") / f"{given}.toml"
 
 

@@ -3,7 +3,17 @@
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import FINGER_ROOM_M, PAD_M, Array, Solid, all_boxes, angle_between, extent, holds, holds_whole
+from apo_bench.geometry import (
+    FINGER_ROOM_M,
+    PAD_M,
+    Array,
+    Solid,
+    all_boxes,
+    find_holds,
+    holds_whole,
+    measure_angle,
+    measure_extent,
+)
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.scenario.tables import GraspTable
 from apo_bench.scenario.values import normalize_axis
@@ -42,9 +52,9 @@ def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: 
     grasp = _across_boxes(point, across, solid, before)
     complete = stated.at_mm is not None and across is not None
     if grasp and (complete or _holds_box(solid, grasp, before)):
-        ends = extent(solid.pieces, grasp.across)
+        ends = measure_extent(solid.pieces, grasp.across)
         narrow = ends[1] - ends[0] <= _MOST_HELD_M
-        if stated != GraspTable() or narrow or not holds(solid, np.round(before[2, :3], 9), _OPENING_M):
+        if stated != GraspTable() or narrow or not find_holds(solid, np.round(before[2, :3], 9), _OPENING_M):
             return grasp
     return _by_shape(stated, across, place, part, solid, before)
 
@@ -75,14 +85,14 @@ def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Gras
     ahead = normalize_axis(stated.ahead, f"{place}, ahead")
     across = normalize_axis(stated.across, f"{place}, across")
     require(abs(ahead @ across) <= _LEVEL, f"{place}, ahead: an axis that is square to 'across' is needed.")
-    tilt = float(np.degrees(angle_between(-before[2, :3], ahead)))
+    tilt = float(np.degrees(measure_angle(-before[2, :3], ahead)))
     require(
         tilt <= MOST_TILT_DEG + _LEVEL,
         f"{place}, ahead: an axis within {MOST_TILT_DEG:g} degrees of straight down is needed, {tilt:.3g} are given.",
     )
     point = 1e-3 * np.array(stated.at_mm)
     for axis, over in ((across, 0.0), (np.cross(ahead, across), 0.0), (-ahead, PAD_M[1])):
-        low, high = extent(solid.pieces, axis)
+        low, high = measure_extent(solid.pieces, axis)
         inside = low - _LEVEL <= point @ axis <= high + over + _LEVEL
         require(inside, f"{place}, at_mm: a point of the part, or up to {1e3 * over:g} mm before it, is needed.")
     return Grasp(point, across, ahead=ahead)
@@ -95,7 +105,7 @@ def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
 
 def _by_shape(stated: GraspTable, across: Array | None, place: str, part: str, solid: Solid, T: Array) -> Grasp:
     """The best place for pads; of those that are near to what is stated, if something is."""
-    grasps = [Grasp(hold.point, hold.across) for hold in holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
+    grasps = [Grasp(hold.point, hold.across) for hold in find_holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
     if across is not None:
         grasps = [grasp for grasp in grasps if abs(grasp.across @ across) > 1.0 - _LEVEL]
     size = " x ".join(f"{round(1e3 * x, 1):g}" for x in solid.bounds[1] - solid.bounds[0])

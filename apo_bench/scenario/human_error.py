@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Layout, Operation, Poses, placements, touched_contacts
+from apo_bench.assembly import Assembly, Layout, Operation, Poses, compute_placements, find_touched_contacts
 from apo_bench.geometry import Array
 from apo_bench.scenario.scenario import Scenario
 
@@ -43,7 +43,7 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
     left = ()
     if scenario.human_error is None or not offset.any():
         return ErrorSpread(offsets, left)
-    stages = (layout.start, *placements(assembly, layout.start, layout.poses))
+    stages = (layout.start, *compute_placements(assembly, layout.start, layout.poses))
     for k, operation in enumerate(assembly.operations):
         R = layout.poses[k][:3, :3]
         if k == scenario.human_error.operation:
@@ -54,7 +54,7 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
     return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
 
 
-def human_error_covariance(scenario: Scenario, human_error_scale: float) -> Array:
+def compute_human_error_covariance(scenario: Scenario, human_error_scale: float) -> Array:
     """(n, 6, 6) [m^2]: the mean square of each operation's error along its own direction, zero where there is none."""
     covariance = np.zeros((len(scenario.assembly), 6, 6))
     if scenario.human_error is not None:
@@ -67,7 +67,7 @@ def human_error_covariance(scenario: Scenario, human_error_scale: float) -> Arra
 def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
     """Return how far the faces of displaced parts guide a part off its place, (3,), world, [m]."""
     shift = np.zeros(3)
-    touched = touched_contacts(assembly, operation.contacts, operation.moves, poses)
+    touched = find_touched_contacts(assembly, operation.contacts, operation.moves, poses)
     guides = [each for each in touched if each.rests in displaced]
     for _ in range(_SWEEPS):
         for each in guides:

@@ -7,20 +7,28 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Layout, Poses
-from apo_bench.geometry import Array, extent, physical_pieces, pose
+from apo_bench.geometry import Array, measure_extent, pose, shrink_pieces
 from apo_bench.scenario.scenario import Scenario
 
 
 @check_arguments
 def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
-    """A consistent layout: every contact of the scenario stays closed.
+    """Draw the true poses of a trial; every contact of the scenario holds.
 
     Uniform draws in this order: x, y and yaw of the site, then one for each shift and one for each turn of the
-    scenario. Parts start where the scenario says, in the world; only fixed parts that follow the site move with it.
+    scenario. Only fixed parts that follow the site move with it; all others start as the scenario states.
 
     Args:
-        clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start
-            stands that much lower.
+        scenario: From `load_scenario`.
+        rng: The only source of chance.
+        clearance_mm: Clearance per side. Default: that of the scenario. A part that stands on a fit face at its start
+            stands lower by it.
+
+    Examples:
+        >>> import apo_bench, numpy as np
+        >>> scenario = apo_bench.load_scenario("stick_in_tower")
+        >>> apo_bench.draw_layout(scenario, np.random.default_rng(7)).poses.shape
+        (3, 4, 4)
     """
     site = scenario.site
     spans = [site.yaw_rad, *((shift.low_m, shift.high_m) for shift in scenario.shifts)]
@@ -31,10 +39,10 @@ def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: floa
     shifts = varied[: len(scenario.shifts)]
     turns = varied[len(scenario.shifts) :]
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
-    return layout_at(scenario, x, y, yaw, shifts, clearance, turns)
+    return place_layout(scenario, x, y, yaw, shifts, clearance, turns)
 
 
-def layout_at(
+def place_layout(
     scenario: Scenario,
     x_m: float,
     y_m: float,
@@ -67,11 +75,13 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not solid.fits:
         return T
     lowered = np.array(T)
-    lowered[2, 3] -= extent(physical_pieces(solid, clearance_m), T[2, :3])[0] - extent(solid.pieces, T[2, :3])[0]
+    lowered[2, 3] -= (
+        measure_extent(shrink_pieces(solid, clearance_m), T[2, :3])[0] - measure_extent(solid.pieces, T[2, :3])[0]
+    )
     return lowered
 
 
-def nominal_start(scenario: Scenario) -> Poses:
+def find_nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad

@@ -4,7 +4,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses
 from apo_bench.errors import require
-from apo_bench.geometry import TOUCH_M, drop, drop_depths
+from apo_bench.geometry import TOUCH_M, measure_drop, measure_drop_depths
 
 _SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
@@ -66,14 +66,14 @@ AIR_M = 1e-4
 """Lower above what is below it, a part settles within the first steps, at its start."""
 
 
-def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
+def find_part_in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
     """The first movable part that starts more than so much above what is below it, and where it is, in words."""
     for part, solid in assembly.solids.items():
         others = {name: other for name, other in assembly.solids.items() if name != part}
         way = np.array([most_m])
-        deep = (drop_depths(solid, start[part], way, other, start[name])[0] for name, other in others.items())
+        deep = (measure_drop_depths(solid, start[part], way, other, start[name])[0] for name, other in others.items())
         if part not in assembly.fixed and not any(depth > TOUCH_M for depth in deep):
-            falls = {name: drop(solid, start[part], other, start[name]) for name, other in others.items()}
+            falls = {name: measure_drop(solid, start[part], other, start[name]) for name, other in others.items()}
             below = min(falls, key=lambda name: falls[name])
             height = f"{round(1e3 * falls[below], 2):g} mm above '{below}'"
             return part, f"'{part}' starts in the air, {'with nothing below it' if np.isinf(falls[below]) else height}"

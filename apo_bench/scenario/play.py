@@ -1,6 +1,6 @@
 """Checks that shafts have play in their holes."""
 
-from apo_bench.assembly import Assembly, contact_kind, geometric_play, play_mm
+from apo_bench.assembly import Assembly, classify_contact, compute_geometric_play, compute_play_mm
 from apo_bench.errors import require
 from apo_bench.scenario.scenario import Scenario
 
@@ -12,8 +12,8 @@ def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
     """Why the first shaft that is as thick as its hole, or thicker, has no play there; None if all have some."""
     for contact in (contact for operation in assembly.operations for contact in operation.contacts):
         a, b = map(assembly.face_of, contact)
-        if contact_kind(a, b) == "shaft in hole" and (play_mm(a, b, clearance_mm) or 0.0) <= _NO_PLAY_MM:
-            why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
+        if classify_contact(a, b) == "shaft in hole" and (compute_play_mm(a, b, clearance_mm) or 0.0) <= _NO_PLAY_MM:
+            why = f"{1e3 * compute_geometric_play(a, b):.4g} mm per side by their sizes"
             fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
             return f"'{contact}': the shaft has no play in the hole, {why}{fit}"
     return None

@@ -17,6 +17,10 @@ def save_scenario(scenario: Scenario, folder: str | Path) -> Path:
 
     Parts of the package are named, not copied.
 
+    Args:
+        scenario: A scenario that was read from a file.
+        folder: The folder, made if it does not exist.
+
     Returns:
         The scenario file.
 

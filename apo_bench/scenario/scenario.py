@@ -9,13 +9,13 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, copyable, freeze, pose
+from apo_bench.geometry import Array, freeze, make_copyable, pose
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.records import Meaning, Thresholds
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """Where the gripper holds the main part, from above or tilted."""
@@ -34,7 +34,7 @@ class Grasp:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Shift:
     """How far the truth of an operation may vary along a direction that no contact fixes."""
@@ -51,7 +51,7 @@ class Shift:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Turn:
     """How far the truth of an operation may turn about an axis, where no contact fixes that."""
@@ -87,7 +87,7 @@ class Site:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class HumanError:
     """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
@@ -112,44 +112,55 @@ class HumanError:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """One demonstration: topology, nominal goals, and how its truth and its human vary."""
+    """A task of n operations: parts, contacts, nominal poses, and the variation of layout and human."""
 
     name: str
+    """Short name, or that of the file."""
     title: str
+    """The task in a few words."""
     paper: str
-    """Where it stands in the paper."""
+    """The place in the paper."""
     human: str
-    """What the human does and gets wrong, in words."""
+    """The actions and the error of the human, in words."""
     success: str
-    """When it is right, in words."""
+    """The condition of success, in words."""
     assembly: Assembly
+    """Solids, operations and contacts, without poses."""
     part_files: Mapping[str, Path]
+    """Part -> its MJCF file."""
     colors: Mapping[str, tuple[float, float, float]]
+    """Part -> red, green and blue, from 0 to 1."""
     start: Poses
-    """Where every part stands before the demonstration; fixed parts stay there. World frame."""
+    """Part -> its pose before the demonstration, (4, 4), world frame, [m]; fixed parts stay there."""
     goals: Array
-    """(n, 4, 4): the nominal goals, consistent with every contact; frame of the assembly."""
+    """(n, 4, 4): nominal poses that satisfy every contact, frame of the assembly, [m]."""
     attach: tuple[Attach, ...]
-    """The line of every operation, stated or found (`apo_bench.planning.insertion`)."""
+    """The insertion axis of every operation, stated or found."""
     grasps: tuple[Grasp, ...]
+    """The grasp of every operation."""
     site: Site
+    """The place of the assembly on the table, drawn for each seed."""
     shifts: tuple[Shift, ...]
+    """Directions that no contact determines, drawn for each seed."""
     human_error: HumanError | None
+    """The error of the human at scale 1; None: the human makes none."""
     thresholds: Thresholds
+    """Thresholds of the judge."""
     clearance_mm: float
+    """Clearance per side of parts that fit."""
     gap_mm: float
     """Largest |e| at which the contact equations count as solved."""
     success_means: Meaning = "assembled"
-    """What the judge calls a success: that the finished assembly is right, or that it was made as demonstrated."""
+    """`assembled`: the finished assembly is right; `as_demonstrated`: each contact was also made as demonstrated."""
     turns: tuple[Turn, ...] = ()
-    """What may turn in each layout; drawn after the shifts."""
+    """Rotations that no contact determines, drawn for each seed after the shifts."""
     follows_site: frozenset[str] = frozenset()
-    """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
+    """Fixed parts that move with the site."""
     source: Path | None = None
-    """The file that it was read from."""
+    """The scenario file."""
 
     def __post_init__(self) -> None:
         freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4), part_files=None, colors=None)

@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.assembly import GapKind
-from apo_bench.io import Table, Text, Triple
+from apo_bench.io import FileTable, Text, Triple
 from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.scenario.values import LARGEST_LENGTH_MM, Angle, Axis, Length, Point, Pose
 
@@ -21,7 +21,7 @@ _Undersize = Annotated[float, Meta(ge=-_MOST_UNDERSIZE_MM, le=_MOST_UNDERSIZE_MM
 _LARGEST_THRESHOLDS = {"overlap_fraction": 1.0, "loose_angle_deg": 180.0}
 
 
-class PartTable(Table, frozen=True, kw_only=True):
+class PartTable(FileTable, frozen=True, kw_only=True):
     """`[parts.NAME]`."""
 
     file: Text
@@ -33,7 +33,7 @@ class PartTable(Table, frozen=True, kw_only=True):
     """Face -> by how much it lies deeper in the part than its file says, [mm]."""
 
 
-class ContactTable(Table, frozen=True, kw_only=True):
+class ContactTable(FileTable, frozen=True, kw_only=True):
     """An entry of `contacts`."""
 
     faces: tuple[Text, Text]
@@ -41,14 +41,14 @@ class ContactTable(Table, frozen=True, kw_only=True):
     gap_mm: tuple[Length, Length] | None = None
 
 
-class AttachTable(Table, frozen=True, kw_only=True):
+class AttachTable(FileTable, frozen=True, kw_only=True):
     """`attach`: what is stated of the line to the goal."""
 
     along: Axis | None = None
     travel_mm: Annotated[float, Meta(gt=0.0, le=LARGEST_LENGTH_MM)] | None = None
 
 
-class GraspTable(Table, frozen=True, kw_only=True):
+class GraspTable(FileTable, frozen=True, kw_only=True):
     """`grasp`: what is stated of the place where the gripper holds the part."""
 
     at_mm: Triple | None = None
@@ -56,7 +56,7 @@ class GraspTable(Table, frozen=True, kw_only=True):
     ahead: Axis | None = None
 
 
-class VaryTable(Table, frozen=True, kw_only=True):
+class VaryTable(FileTable, frozen=True, kw_only=True):
     """An entry of `vary`: a shift, `along` with `mm`, or a turn, `about` with `deg`."""
 
     along: Axis | None = None
@@ -66,7 +66,7 @@ class VaryTable(Table, frozen=True, kw_only=True):
     at_mm: Point = (0.0, 0.0, 0.0)
 
 
-class OperationTable(Table, frozen=True, kw_only=True):
+class OperationTable(FileTable, frozen=True, kw_only=True):
     """An entry of `[[operations]]`."""
 
     move: Text
@@ -78,7 +78,7 @@ class OperationTable(Table, frozen=True, kw_only=True):
     vary: VaryTable | tuple[VaryTable, ...] = ()
 
 
-class SiteTable(Table, frozen=True, kw_only=True):
+class SiteTable(FileTable, frozen=True, kw_only=True):
     """`[site]`."""
 
     center_mm: tuple[Length, Length] = (0.0, 0.0)
@@ -86,7 +86,7 @@ class SiteTable(Table, frozen=True, kw_only=True):
     yaw_deg: tuple[Angle, Angle] = (0.0, 0.0)
 
 
-class HumanErrorTable(Table, frozen=True, kw_only=True):
+class HumanErrorTable(FileTable, frozen=True, kw_only=True):
     """`[human_error]`."""
 
     operation: int
@@ -101,12 +101,12 @@ JudgeTable = msgspec.defstruct(
         (field.name, Annotated[float, Meta(ge=0.0, le=_LARGEST_THRESHOLDS.get(field.name, 1e4))], field.default)
         for field in fields(Thresholds)
     ],
-    bases=(Table,),
+    bases=(FileTable,),
 )
 """`[judge]`: what counts as success, and thresholds."""
 
 
-class ScenarioTable(Table, frozen=True, kw_only=True):
+class ScenarioTable(FileTable, frozen=True, kw_only=True):
     """A whole file."""
 
     schema: Literal[1]

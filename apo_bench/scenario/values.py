@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, Table, Triple, check_quaternion
+from apo_bench.io import FileTable, Quadruple, Triple, check_quaternion
 
 LARGEST_LENGTH_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
@@ -23,7 +23,7 @@ Axis = str | Triple
 _AXES = {f"{sign}{'xyz'[i]}": value * np.eye(3)[i] for sign, value in (("", 1), ("+", 1), ("-", -1)) for i in range(3)}
 
 
-class Pose(Table, frozen=True, kw_only=True):
+class Pose(FileTable, frozen=True, kw_only=True):
     """A pose in the frame of the world or of the assembly."""
 
     at_mm: Point
@@ -35,7 +35,7 @@ class Pose(Table, frozen=True, kw_only=True):
         return pose.at(1e-3 * np.array(self.at_mm), self.turn_deg)
 
 
-class AnyPose(Table, frozen=True, kw_only=True):
+class AnyPose(FileTable, frozen=True, kw_only=True):
     """A pose whose turn is stated in one of three ways."""
 
     at_mm: tuple[_Far, _Far, _Far]

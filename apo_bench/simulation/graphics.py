@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import SAFE_PATH, environment
+from apo_bench.io import SAFE_PATH, set_environment
 
 _VARIABLE = "MUJOCO_GL"
 _CHILDREN = {SAFE_PATH: "1"}
@@ -17,7 +17,7 @@ _SHADOW_REACH = 0.5
 """Half width of the shadow map over the size of the scene."""
 
 
-@environment(_CHILDREN)
+@set_environment(_CHILDREN)
 def renderer(model: Any, width: int, height: int) -> Any:
     """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
 
@@ -53,7 +53,7 @@ def renderer(model: Any, width: int, height: int) -> Any:
         ) from error
 
 
-@environment(_CHILDREN)
+@set_environment(_CHILDREN)
 def need_window() -> None:
     """Refuse a window for which MuJoCo's viewer would end the process.
 

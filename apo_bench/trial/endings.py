@@ -14,8 +14,8 @@ from apo_bench.records import (
     RECORD_SCHEMA,
     TrialConfig,
     TrialRecord,
-    sentence,
-    setting_columns,
+    describe_outcome,
+    list_setting_columns,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.trial.fingerprint import config_hash
@@ -31,7 +31,7 @@ def start_record(config: TrialConfig, scenario: Scenario, hashed: str) -> TrialR
         hashed: From `config_hash`.
     """
     versions = {"schema": RECORD_SCHEMA, "env_id": ENV_ID, "config_hash": hashed}
-    settings = setting_columns(config, scenario.name)
+    settings = list_setting_columns(config, scenario.name)
     return cast(TrialRecord, versions | settings | {"thresholds": asdict(scenario.thresholds)})
 
 
@@ -57,7 +57,7 @@ def record_lost_trial(config: TrialConfig, content: str, code: str) -> TrialReco
     Args:
         content: From `content_hash`.
     """
-    return _record_failure(config, content, None, Outcome("worker", code, None, sentence(code)))
+    return _record_failure(config, content, None, Outcome("worker", code, None, describe_outcome(code)))
 
 
 def record_misbehaviour(config: TrialConfig, content: str, demonstration: str, why: str) -> TrialRecord:

@@ -11,7 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Correction, Observation, Plan, contact_equations, poses_in_force
+from apo_bench.assembly import Correction, Observation, Plan, build_contact_equations, list_poses_in_force
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.failure import predict
@@ -70,12 +70,16 @@ class FittingPlan:
 
 @check_arguments
 def fit_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
-    """Plan a correction, moved along free directions so that it fits.
+    """Plan the execution of a correction; free directions are chosen so that every motion fits and is in reach.
 
     Args:
-        observation: What the corrector was given.
-        where: The scene that the plan is to be carried out in. Of a scenario, which is compiled if need be, a plan that
-            is foretold to fit counts as in reach.
+        correction: From `correct`.
+        observation: The observation that was corrected.
+        where: The scene of the execution. For a scenario, which is compiled if needed, a plan that is predicted to fit
+            counts as in reach.
+
+    Returns:
+        The plan, its prediction of failure, and the moves along free directions.
 
     Raises:
         InputError: The correction did not converge.
@@ -149,8 +153,8 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact each time before work is taken apart, [m]."""
     return [
-        contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
-        for upto, goals in poses_in_force(plan)[:-1]
+        build_contact_equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        for upto, goals in list_poses_in_force(plan)[:-1]
     ]
 
 

@@ -14,18 +14,18 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Equations, Observation, contact_equations
+from apo_bench.assembly import Equations, Observation, build_contact_equations
 from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.correction.solvers import (
     CompactEquations,
     Inequalities,
-    compact_equations,
-    demands_of,
-    freedom_of,
-    nearest_poses,
-    noise_factor,
-    twists_of,
-    violations,
+    build_compact_equations,
+    compute_freedom,
+    compute_violations,
+    factor_noise,
+    find_nearest_poses,
+    list_contact_demands,
+    unwhiten_twists,
 )
 from apo_bench.geometry import Array, pose
 
@@ -63,8 +63,8 @@ class _Held(NamedTuple):
 
     def put_back(self, goals: Array) -> Array | None:
         """The nearest goals at which every contact holds as well as before; None if none were found."""
-        nearest = nearest_poses(self.compact.among(self.kept & self.exact), goals, self.L)
-        off = violations(self.system, self.exact, self.inequalities, nearest.poses)
+        nearest = find_nearest_poses(self.compact.among(self.kept & self.exact), goals, self.L)
+        off = compute_violations(self.system, self.exact, self.inequalities, nearest.poses)
         return nearest.poses if nearest.finite and (off <= self.limits)[self.kept].all() else None
 
 
@@ -101,12 +101,12 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
         InputError: A covariance is not positive definite.
     """
     held = _held(observation, goals)
-    nearest = nearest_poses(held.compact.among(held.kept & held.exact), goals, held.L)
+    nearest = find_nearest_poses(held.compact.among(held.kept & held.exact), goals, held.L)
     # B Z: twists of one standard deviation along the null space Z of the whitened equations
-    known = freedom_of(nearest.Jt)
+    known = compute_freedom(nearest.Jt)
     if known is None or not known.free.shape[1]:
         return None
-    return FreeSpace(goals, twists_of(nearest.B, known.free), held)
+    return FreeSpace(goals, unwhiten_twists(nearest.B, known.free), held)
 
 
 def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
@@ -206,17 +206,17 @@ def shortest_above(G: Array, h: Array) -> Array | None:
 def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
     assembly = observation.assembly
-    plain = contact_equations(assembly, observation.start, goals)
-    system, exact, inequalities = demands_of(plain, assembly, observation.play_m)
-    off = violations(system, exact, inequalities, goals)
+    plain = build_contact_equations(assembly, observation.start, goals)
+    system, exact, inequalities = list_contact_demands(plain, assembly, observation.play_m)
+    off = compute_violations(system, exact, inequalities, goals)
     if (off > observation.gap_m).any():
         none = np.zeros(0)
         system = plain
         exact = np.ones_like(exact)
         inequalities = Inequalities(plain.among(~exact), none, none)
-        off = violations(system, exact, inequalities, goals)
+        off = compute_violations(system, exact, inequalities, goals)
     limits = np.maximum(off, _EXACT_M)
-    compact = compact_equations(system, len(assembly))
+    compact = build_compact_equations(system, len(assembly))
     return _Held(
         system,
         compact,
@@ -231,8 +231,8 @@ def _held(observation: Observation, goals: Array) -> _Held:
 def _factor(observation: Observation) -> Array:
     """L of the observation, as if everything had been seen."""
     if observation.observed.all():
-        return noise_factor(observation)
+        return factor_noise(observation)
     covariance = np.where(observation.observed[:, None, None], observation.covariance, UNKNOWN)
-    return noise_factor(
+    return factor_noise(
         Observation(observation.assembly, observation.start, observation.poses, covariance, observation.observed)
     )

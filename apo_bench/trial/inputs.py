@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.io import opened
+from apo_bench.io import open_file
 from apo_bench.names import find_own_module
 from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.records.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
-from apo_bench.scenario import Scenario, scenario_path
+from apo_bench.scenario import Scenario, find_scenario_path
 from apo_bench.scenario.parts import read_part
 
 _CHUNK = 1 << 20
@@ -82,7 +82,7 @@ def digest_files(paths: Iterable[Path]) -> str:
     """
     found = []
     for path in paths:
-        with opened(path, "input file") as file:
+        with open_file(path, "input file") as file:
             whole = hashlib.sha256()
             while chunk := file.read(_CHUNK):
                 whole.update(chunk)
@@ -125,7 +125,7 @@ def module_files(module: str) -> tuple[Path, ...]:
 def _scenario_digest(scenario: Scenario, source: str | Path | Scenario) -> str:
     if isinstance(source, Scenario):
         return digest(json.dumps(_plain(scenario), sort_keys=True).encode())
-    return digest_files([scenario_path(source)])
+    return digest_files([find_scenario_path(source)])
 
 
 def _plain(value: Any) -> Any:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import require_known
-from apo_bench.records import NOISE_LEVEL, NOISE_MODEL, SETTINGS, TrialConfig, noise_pair
+from apo_bench.records import NOISE_LEVEL, NOISE_MODEL, SETTINGS, TrialConfig, parse_noise_level
 from apo_bench.scenario import Scenario, load_scenario
 
 
@@ -25,6 +25,6 @@ def configure_trial(scenario: str | Path | Scenario, **settings: Any) -> tuple[T
     named = scenario.name if isinstance(scenario, Scenario) else str(scenario)
     values: dict[str, Any] = {"scenario": named, "clearance_mm": loaded.clearance_mm}
     if NOISE_LEVEL.name in settings:
-        level = noise_pair(settings.pop(NOISE_LEVEL.name), settings.get("pose_source", NOISE_MODEL))
+        level = parse_noise_level(settings.pop(NOISE_LEVEL.name), settings.get("pose_source", NOISE_MODEL))
         values |= zip(("noise_mm", "noise_deg"), level, strict=True)
     return TrialConfig(**(values | settings)), loaded

@@ -6,16 +6,16 @@ from collections.abc import Iterable
 from apo_bench.assembly import (
     Assembly,
     Correction,
-    InHand,
     Observation,
     Plan,
     ProbingResult,
+    SlipInHand,
     Snapshot,
 )
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.wrong_contacts import culprit
-from apo_bench.records import MovedInHand, TrialRecord, finite
+from apo_bench.records import GraspSlip, TrialRecord, replace_infinite
 from apo_bench.trial.planning import MethodResult
 from apo_bench.trial.pose_error import goal_errors, pose_errors
 from apo_bench.trial.stages import Attempt
@@ -49,7 +49,7 @@ def _test(correction: Correction | None) -> TrialRecord:
     return inferred | {
         "chi_square": float(test.chi_square) if math.isfinite(test.chi_square) else None,
         "chi_square_dof": int(test.freedom),
-        "p_value": finite(test.p_value),
+        "p_value": replace_infinite(test.p_value),
         "consistency_passes": bool(test.passes),
         "suspects": [suspect.relation for suspect in test.ambiguous],
     }
@@ -63,8 +63,8 @@ def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Arr
     fixed, free = (None, None) if plan is None else goal_errors(right, plan.start, truth, plan.target_poses)
     return {
         "inside_95": contains_truth(given, correction, truth) if correction and correction.ok else None,
-        "planned_error_fixed_mm": finite(fixed),
-        "planned_error_free_mm": finite(free),
+        "planned_error_fixed_mm": replace_infinite(fixed),
+        "planned_error_free_mm": replace_infinite(free),
     }
 
 
@@ -106,15 +106,15 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
         "as_demonstrated_code": verdict.demonstrated.code,
         "loose_success": verdict.loose_success,
         "conditions": dict(conditions.conditions),
-        "worst_gap_mm": finite(conditions.gap_mm),
-        "worst_angle_deg": finite(conditions.angle_deg),
-        "least_overlap": finite(conditions.overlap),
-        "penetration_mm": finite(conditions.penetration_mm),
-        "displaced_mm": finite(conditions.displaced_mm),
+        "worst_gap_mm": replace_infinite(conditions.gap_mm),
+        "worst_angle_deg": replace_infinite(conditions.angle_deg),
+        "least_overlap": replace_infinite(conditions.overlap),
+        "penetration_mm": replace_infinite(conditions.penetration_mm),
+        "displaced_mm": replace_infinite(conditions.displaced_mm),
         "reached": _poses(result.reached.final),
-        "pose_error_fixed_mm": finite(fixed),
-        "pose_error_free_mm": finite(free),
-        "peak_force_n": finite(result.peak_force_n),
+        "pose_error_fixed_mm": replace_infinite(fixed),
+        "pose_error_free_mm": replace_infinite(free),
+        "peak_force_n": replace_infinite(result.peak_force_n),
         "grasp_slip": list(map(_slip, result.in_hand)),
         "sim_time_s": result.sim_time_s,
     } | _probing(result.probing)
@@ -133,7 +133,7 @@ def _probing(found: ProbingResult | None) -> TrialRecord:
     }
 
 
-def _slip(each: InHand) -> MovedInHand:
+def _slip(each: SlipInHand) -> GraspSlip:
     return {
         "operation": each.operation + 1,
         "carried_mm": 1e3 * each.carried_m,
@@ -152,4 +152,4 @@ def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
 
 
 def _mm(metres: float) -> float | None:
-    return finite(metres * 1e3)
+    return replace_infinite(metres * 1e3)

@@ -4,7 +4,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Plan
 from apo_bench.planning.prediction.failure import predict
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario import Scenario, place_layout
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene import build_scene
 
@@ -41,7 +41,7 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
     scene = build_scene(scenario, arm=arm)
     if plan is None:
         x, y = scenario.site.center_m
-        at = layout_at(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
+        at = place_layout(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
         plan = Plan(scenario.assembly, at.start, at.poses)
     moves = arm_moves(plan, scene)
     prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reobserver, largest_gap
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reobserver, measure_largest_gap
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
-from apo_bench.records import with_simulated
+from apo_bench.records import resolve_simulated
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fitting import FittingPlan, fit_plan
@@ -57,7 +57,7 @@ def apply_method(
             return _uncorrected(observation, fit_nominal_poses(scenario.goals, observation), None)
         if method == "uncorrected" or (method == "nominal" and where is not None):
             return _uncorrected(observation, observation.poses, observation_failure(observation))
-    correction = correct(observation, with_simulated(method), reobserve)
+    correction = correct(observation, resolve_simulated(method), reobserve)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
@@ -65,12 +65,12 @@ def apply_method(
     fitting = FittingPlan(plan) if where is None else fit_plan(correction, observation, where)
     after_m = correction.gap_after_m
     if fitting.moves:
-        after_m = largest_gap(plan.assembly, plan.start, fitting.plan.target_poses)
+        after_m = measure_largest_gap(plan.assembly, plan.start, fitting.plan.target_poses)
     return MethodResult(fitting.plan, None, correction.gap_before_m, after_m, correction, fitting)
 
 
 def _uncorrected(observation: Observation, poses: Array, failure: Outcome | None) -> MethodResult:
-    gap_m = largest_gap(observation.assembly, observation.start, poses)
+    gap_m = measure_largest_gap(observation.assembly, observation.start, poses)
     if failure:
         return MethodResult(None, failure, gap_m, math.nan)
     return MethodResult(Plan(observation.assembly, observation.start, poses), None, gap_m, gap_m)

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Poses, Reached, contact_equations
+from apo_bench.assembly import Assembly, Poses, ReachedState, build_contact_equations
 from apo_bench.correction.solvers import LENGTH_M
-from apo_bench.geometry import Array, pose, turn_alike
+from apo_bench.geometry import Array, find_least_turned, pose
 
 _RANK_CUT_OFF = 1e-7
 """At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
 
 
 def pose_errors(
-    assembly: Assembly, start: Poses, truth_goals: Array, reached: Reached
+    assembly: Assembly, start: Poses, truth_goals: Array, reached: ReachedState
 ) -> tuple[float | None, float | None]:
     """The pose errors of main parts when their operations were over, as `goal_errors` has them.
 
@@ -44,7 +44,7 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
     goals = _turned_back(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
-    _, J = contact_equations(assembly, start, truth_goals).linearise(truth_goals)
+    _, J = build_contact_equations(assembly, start, truth_goals).linearise(truth_goals)
     # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
     basis = _row_space(J / unit)
     fixed = basis.T @ (basis @ error)
@@ -55,7 +55,9 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
-    return np.array([T if solid is None else turn_alike(solid, T, true) for solid, T, true in pairs]).reshape(-1, 4, 4)
+    return np.array([T if solid is None else find_least_turned(solid, T, true) for solid, T, true in pairs]).reshape(
+        -1, 4, 4
+    )
 
 
 def _rms_mm(error: Array, operations: int) -> float:

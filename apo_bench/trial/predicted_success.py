@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
+from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, compute_placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.finished import least_overlaps
 from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
-from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
+from apo_bench.records import NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space
 from apo_bench.trial.predicted_success_table import RATES, SCORES
@@ -56,7 +56,7 @@ _LEAST_WEIGHT = 0.01
 """Explanations that are less likely are passed over."""
 
 
-class Explanation(NamedTuple):
+class PossibleTruth(NamedTuple):
     """What may be true, and how likely that is; the weights sum to 1 at most."""
 
     weight: float
@@ -68,7 +68,7 @@ class Explanation(NamedTuple):
     """Whether the turn of the assembly on the table is unknown, since nothing was observed."""
 
 
-def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[Explanation, ...]:
+def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[PossibleTruth, ...]:
     """Those that a corrector kept; without any, its estimate alone.
 
     Args:
@@ -77,12 +77,12 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     """
     blind = not believed.observed.any()
     if correction is None:
-        return (Explanation(1.0, believed, goals),)
+        return (PossibleTruth(1.0, believed, goals),)
     if not correction.hypotheses:
-        return (Explanation(1.0, correction.assumed or believed, correction.poses, correction.dropped, blind),)
+        return (PossibleTruth(1.0, correction.assumed or believed, correction.poses, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
     share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
-    return tuple(Explanation(share * each.weight, each.assumed, each.poses, each.dropped, blind) for each in likely)
+    return tuple(PossibleTruth(share * each.weight, each.assumed, each.poses, each.dropped, blind) for each in likely)
 
 
 def predict_success(
@@ -115,12 +115,12 @@ def abstain(predicted_success: float, least: float) -> Outcome:
     # as many digits as tell the two apart: 0.947, where 0.95 is required
     shown = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
     why = f": {shown}, where {least:.15g} is required"
-    return Outcome("promise", "abstained", None, sentence("abstained") + why)
+    return Outcome("promise", "abstained", None, describe_outcome("abstained") + why)
 
 
 def plan_score(
     plan: Plan,
-    explained: Sequence[Explanation],
+    explained: Sequence[PossibleTruth],
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
     spiral: bool = False,
@@ -156,7 +156,7 @@ def _by_arm(
     from apo_bench.trial.stages import robot_error_of
 
     arm = arm_moves(plan, scene, spiral)
-    slip = robot_sigmas(robot_error).in_hand
+    slip = parse_robot_error(robot_error).in_hand
     right = not any(slip) if probing else robot_error == NO_ROBOT_ERROR
     if right or any(move.refused is not None for move in arm):
         return [], arm
@@ -171,7 +171,7 @@ def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
     return np.asarray(_spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)[draw])
 
 
-def draw_truths(explanation: Explanation, count: int, rng: np.random.Generator) -> Array:
+def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
     """Draw poses that may be the truth, (count, n, 4, 4), along what contacts leave free."""
     goals = explanation.goals
     try:
@@ -248,7 +248,9 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
     """How surely faces overlap as the judge requires, if the plan is executed exactly and one of these is the truth."""
     scenario = where if isinstance(where, Scenario) else where.scenario
-    overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.target_poses)[-1], truths)
+    overlaps = least_overlaps(
+        plan.assembly, compute_placements(plan.assembly, plan.start, plan.target_poses)[-1], truths
+    )
     possible = overlaps[np.isfinite(overlaps)]
     if not len(possible):
         return _UNKNOWN

@@ -17,10 +17,10 @@ from apo_bench.records import (
     NOISE_LEVEL,
     TrialConfig,
     TrialRecord,
-    in_python,
+    convert_to_python_units,
     read_secret_seed,
 )
-from apo_bench.scenario import Scenario, in_the_air, load_scenario
+from apo_bench.scenario import Scenario, find_part_in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
@@ -85,7 +85,7 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
         usual |= dict.fromkeys(("noise_mm", "noise_deg"), options.pop("noise_level"))
     if "secret_seed_file" in options:
         options["secret_seed_file"] = read_secret_seed(options["secret_seed_file"])
-    return TrialConfig(**(usual | in_python(options)))
+    return TrialConfig(**(usual | convert_to_python_units(options)))
 
 
 def _refuse_drawing(request: Request, options: Mapping[str, Any]) -> None:
@@ -190,7 +190,7 @@ def run_settings(request: Request, config: TrialConfig, show: Show | None = None
     simulated = None
     if request.observation is not None:
         observation = read_stated(request.observation, scene.scenario)
-        aloft = in_the_air(observation.assembly, observation.start, _MEASURED_AIR_M)
+        aloft = find_part_in_the_air(observation.assembly, observation.start, _MEASURED_AIR_M)
         if aloft is not None:
             raise InputError(f"{request.observation}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
         text = read_text(request.observation, "observation file")

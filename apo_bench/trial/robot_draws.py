@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.prediction.resting import resting_poses
-from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
+from apo_bench.simulation.execution import Grip, compute_transferred_poses, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.state import TOUCH_SIGMA_M
 from apo_bench.simulation.robot import RobotError
@@ -32,30 +32,32 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     What is pushed in level floats on its way, as it is carried out.
 
     Args:
-        searches: As in `moves`.
+        searches: As in `plan_moves`.
     """
     resting = plan.start
     states = list[Poses]()
-    for move in moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral):
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]
-        taken, let_go = [error.hand_eye @ _leant(scene, key_angles(t, scene).reached[i], error) for i in (_PICK, -1)]
+        taken, let_go = [
+            error.hand_eye @ _leant(scene, solve_key_angles(t, scene).reached[i], error) for i in (_PICK, -1)
+        ]
         last = t.grips[-1].T_part_tip
         held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.tool, resting[t.part])
         put = let_go @ t.T_world_goal @ last @ error.tool @ error.in_hand[k] @ held @ pose.inverse(last)
-        now = after_transfer(operation, put, resting)
+        now = compute_transferred_poses(operation, put, resting)
         if move.step.undo:
             resting = now
             continue
         floats = pose.at(t.floats * _UP) if t.into.level else np.eye(4)
-        states.append(after_transfer(operation, floats @ put, resting))
+        states.append(compute_transferred_poses(operation, floats @ put, resting))
         alone = replace(plan.assembly, operations=(operation,))
         resting = resting_poses(alone, operation, now)
         for grip in t.centring:
             tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.tool
             centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
-            resting = resting_poses(alone, operation, after_transfer(operation, centred, resting))
+            resting = resting_poses(alone, operation, compute_transferred_poses(operation, centred, resting))
     return tuple(states)
 
 
@@ -66,7 +68,7 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
         slip_deg: Standard deviation of how a part turns in the hand.
     """
     left = np.array(error.in_hand)
-    for move in moves(plan, scene, True, PROBING_ACTIONS):
+    for move in plan_moves(plan, scene, True, PROBING_ACTIONS):
         t = move.transfer
         slip = pose.log(left[move.step.operation])
         if t.flat is not None:

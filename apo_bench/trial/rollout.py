@@ -6,10 +6,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Poses, placements
+from apo_bench.assembly import Observation, Poses, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.records import DEPTH_CAMERA, TrialConfig, TrialRecord
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from apo_bench.simulation.film.track import FilmTrack, Segment, scenario_segment
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
@@ -34,9 +34,9 @@ class Rollout:
 
 def scenario_story(scene: Scene) -> Rollout:
     """What a scenario asks for, operation by operation."""
-    layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
+    layout = place_layout(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
     segment = scenario_segment(scene, layout.start, layout.poses)
-    return Rollout(scene, (segment,), placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
+    return Rollout(scene, (segment,), compute_placements(scene.scenario.assembly, layout.start, layout.poses)[-1])
 
 
 def trial_story(
@@ -74,7 +74,7 @@ def trial_story(
         good=record["success"],
     )
     true = goals.get(AS_TRUE, plan.target_poses)
-    return Rollout(scene, (*segments, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
+    return Rollout(scene, (*segments, reached), compute_placements(scene.scenario.assembly, start, true)[-1], goals)
 
 
 def ending(record: TrialRecord) -> str:

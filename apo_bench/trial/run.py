@@ -12,28 +12,28 @@ from typing import Any, cast, final
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Plan
-from apo_bench.correction.calibration import UNKNOWN, prior_estimate, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, compute_slip_sigmas, make_prior_estimate
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.names import function_name
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.reobservations import Reobservations
-from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.records import (
     DEPTH_CAMERA,
     DETECTED,
     USUAL_FT_SENSOR,
     TrialConfig,
     TrialRecord,
-    assumed_error,
     knows_truth,
+    parse_assumed_error,
     parse_method,
-    robot_sigmas,
+    parse_robot_error,
     uses_contacts,
 )
 from apo_bench.records.run.validation import unwritable
-from apo_bench.scenario import Scenario, scenario_names
+from apo_bench.scenario import Scenario, list_scenario_names
 from apo_bench.simulation.execution import ExecutionConfig, ReplayCache
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.hooks import Hooks
@@ -96,17 +96,17 @@ def run_trial(
     cache: ReplayCache | None = None,
     **settings: Any,
 ) -> TrialRecord:
-    """Run one trial, for example `run_trial("stick_in_tower", method="contact", noise_level=1, seed=7)`.
+    """Run one trial from the demonstration to the verdict.
 
     Args:
         config: A configuration, or a scenario (name, path or object) whose settings are the keywords.
-        scene: Compiled for scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
+        scene: The scene of scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
         method: A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)`
             poses in the world frame, [m]. Default: that of the configuration.
         simulated: The demonstration of this seed and human error scale. Default: simulated here.
         content: From `content_hash`. Default: computed here.
-        watch: As `Callbacks`.
-        cache: As in `RunContext`.
+        watch: Called with the `mujoco.MjData` about every 20 ms of simulated time, such as a `Film`.
+        cache: States that replays of the scene share; it changes only the computing time.
         settings: Settings of `TrialConfig` and `noise_level`, with a scenario.
 
     Returns:
@@ -127,7 +127,7 @@ def run_trial(
         config = replace(config, method=method if isinstance(method, str) else function_name(method))
     scene = scene or scene_of(config)
     require(
-        config.scenario == scene.scenario.name or config.scenario not in scenario_names(),
+        config.scenario == scene.scenario.name or config.scenario not in list_scenario_names(),
         f"the settings name the scenario '{config.scenario}', the scene is of '{scene.scenario.name}'; build the "
         "scene of the same scenario, or leave it out.",
     )
@@ -223,7 +223,7 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
     error = draw_robot_error(config.robot_error, scene, config.seed, config.secret_seed)
     probing = None
     if probe:
-        assumed = assumed_error(config.assumed_robot_error, config.robot_error)
+        assumed = parse_assumed_error(config.assumed_robot_error, config.robot_error)
         key = stream_key(config.seed, WRENCH, config.secret_seed)
         probing = probing_config(plan, scene, assumed, key, config.ft_sensor)
     execution = ExecutionConfig(config.fidelity, spiral, robot_error=error, probing=probing)
@@ -241,7 +241,7 @@ def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array
     if truth is None:
         return observation
     rng = stream(config.seed, CONTACT_SOURCE, config.secret_seed)
-    return with_contacts(observation, make_contacts(config.contact_source), truth, rng)
+    return replace_contacts(observation, make_contacts(config.contact_source), truth, rng)
 
 
 def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
@@ -270,9 +270,9 @@ def probing_config(
     Raises:
         InputError: An unknown kind of error, or a number that is not allowed.
     """
-    sigmas = UNKNOWN if assumed is None else robot_sigmas(assumed)
-    estimate = prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
-    return ProbingConfig(estimate, slip_sigmas(sigmas), seed, ft_sensor, actions)
+    sigmas = UNKNOWN if assumed is None else parse_robot_error(assumed)
+    estimate = make_prior_estimate(sigmas, len(scene.arm.joints), plan.target_poses[:, :3, 3].mean(axis=0))
+    return ProbingConfig(estimate, compute_slip_sigmas(sigmas), seed, ft_sensor, actions)
 
 
 def record_trial(

@@ -19,11 +19,11 @@ from apo_bench.records import (
     DEPTH_CAMERA,
     NO_ROBOT_ERROR,
     SETTINGS,
-    Predicted,
+    FailurePrediction,
     SecretSeed,
     TrialConfig,
-    robot_sigmas,
-    sentence,
+    describe_outcome,
+    parse_robot_error,
 )
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
@@ -155,7 +155,7 @@ def reobservations_of(
 def demonstration_failure(demonstration: Demonstration) -> Outcome:
     """Why a demonstration that is not right itself is not replayed."""
     why = f": {demonstration.why}" if demonstration.why else ""
-    return Outcome("demonstrate", demonstration.code, None, sentence(demonstration.code) + why)
+    return Outcome("demonstrate", demonstration.code, None, describe_outcome(demonstration.code) + why)
 
 
 def observation_failure(observation: Observation) -> Outcome | None:
@@ -163,10 +163,10 @@ def observation_failure(observation: Observation) -> Outcome | None:
     if observation.observed.all():
         return None
     k = int(np.argmin(observation.observed))
-    return Outcome("observe", "not_seen", k, sentence("not_seen", operation=k))
+    return Outcome("observe", "not_seen", k, describe_outcome("not_seen", operation=k))
 
 
-def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> Predicted:
+def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> FailurePrediction:
     """What plan and arm say before it is carried out, as it stands in a record: operations from 1, mm.
 
     Args:
@@ -176,7 +176,7 @@ def predicted_outcome(plan: Plan, scene: Scene, spiral: bool = False) -> Predict
     arm = arm_moves(plan, scene, spiral)
     prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
-    predicted: Predicted = {
+    predicted: FailurePrediction = {
         "fails": prediction.fails,
         "operation": operation,
         "code": prediction.code,
@@ -206,7 +206,7 @@ def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...
         name: As in a record.
         drawn: Draws so many standard normal numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
     """
-    sigmas = robot_sigmas(name)
+    sigmas = parse_robot_error(name)
     shift, turn = drawn(HAND_EYE, (2, 3))
     hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * shift, sigmas.hand_eye[1] * turn)
     middle = np.eye(4)
@@ -247,12 +247,12 @@ def replay_and_judge(
 def trial_outcome(attempt: Attempt) -> Outcome:
     """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
     if attempt.verdict.success:
-        return Outcome("done", "ok", None, sentence("ok"))
+        return Outcome("done", "ok", None, describe_outcome("ok"))
     if attempt.result.outcome.failed:
         return attempt.result.outcome
     conditions = attempt.verdict.rests_on
     why = f": {conditions.why}" if conditions.why else ""
-    return Outcome("judge", conditions.code, None, sentence(conditions.code) + why)
+    return Outcome("judge", conditions.code, None, describe_outcome(conditions.code) + why)
 
 
 _SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)

@@ -15,7 +15,7 @@ from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
 from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
 from apo_bench.simulation.film.window import PICTURE_S
-from apo_bench.simulation.scene import initial_state
+from apo_bench.simulation.scene import make_initial_state
 from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.stepping import Cursor
 
@@ -69,7 +69,7 @@ class Page:
     def __init__(self, rollout: Rollout, port: int) -> None:
         self.cursor = Cursor(rollout)
         self._requests = deque[str | int]()
-        self._data = initial_state(rollout.scene.work, rollout.segments[0].start)
+        self._data = make_initial_state(rollout.scene.work, rollout.segments[0].start)
         self._server = _server(port)
         self._drawn: object = None
         self._shown: dict[tuple[ShapeKind, int], Any] = {}

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 from apo_bench.perception.depth_camera.follow import Event
 from apo_bench.viz.depth_run import DepthRun
 
@@ -17,7 +17,7 @@ _AROUND = 20  # pixels around the changes
 _LARGEST_MM = 60.0
 
 
-@default_looks()
+@use_figure_style()
 def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     """Draw every change in one view of the depth camera, counted from 0."""
     from matplotlib.figure import Figure

@@ -8,11 +8,19 @@ import numpy as np
 from apo_bench.assembly import Observation
 from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
-from apo_bench.geometry import Array, Solid, extent
-from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
+from apo_bench.geometry import Array, Solid, measure_extent
+from apo_bench.io import add_the, group_by, join_words, save_figure, use_figure_style
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, aim_camera, build_scene, draw_picture, pixels
+from apo_bench.simulation.scene import (
+    Marks,
+    ShiftArrows,
+    TurnRing,
+    aim_camera,
+    build_scene,
+    draw_picture,
+    project_to_pixels,
+)
 from apo_bench.viz.dof_text import format_deviation
 from apo_bench.viz.panels import Color, Panel, PanelLine, draw_panels
 
@@ -26,7 +34,7 @@ _LOW = 0.3  # height of a ring on its part, as a share of the part's length alon
 _SHADE = 0.8  # an arrow has so much of the brightness of its part
 
 
-@default_looks()
+@use_figure_style()
 def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
     """Write a PNG picture, with a sentence for each part below.
 
@@ -53,7 +61,11 @@ def draw_dof(scenario: Scenario, observation: Observation, explanation: Explanat
     title = f"{scenario.name}: directions that no contact fixes: {explanation.freedom} of {6 * len(explanation.poses)}"
     figure = draw_panels(title, [Panel(image, lines)])
     for mark in marks:
-        _write_name(figure.axes[0], mark, pixels(mark.tips, camera, float(scene.shown.model.vis.global_.fovy), *_SIZE))
+        _write_name(
+            figure.axes[0],
+            mark,
+            project_to_pixels(mark.tips, camera, float(scene.shown.model.vis.global_.fovy), *_SIZE),
+        )
     save_figure(figure, out)
 
 
@@ -67,7 +79,7 @@ def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Ar
     at = T[:3, 3]
     r, g, b = (_SHADE * c for c in color)
     axis = R @ direction.axis
-    low, high = extent(solid.pieces, direction.axis)
+    low, high = measure_extent(solid.pieces, direction.axis)
     if not direction.turns:
         middle = solid.bounds.mean(axis=0)
         reach = high - direction.axis @ middle + _AWAY_M
@@ -76,7 +88,7 @@ def _mark(solid: Solid, T: Array, color: Color, direction: Direction, toward: Ar
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
     # two unit vectors at right angles to the axis: rows of V^T that belong to no singular value
     across = np.linalg.svd(direction.axis[None])[2][1:]
-    ends = np.array([extent(solid.pieces, v) for v in across]) - (across @ about)[:, None]
+    ends = np.array([measure_extent(solid.pieces, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
     return TurnRing(R @ about + at, axis, toward, radius, (r, g, b), str(direction))
 
@@ -94,11 +106,11 @@ def _write_name(axes: Any, mark: Any, tips: Array) -> None:
 def _describe(explanation: Explanation, o: OperationExplanation) -> str:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; z fixed`."""
     groups = []
-    for along, words in grouped(
+    for along, words in group_by(
         (free.along, f"{free.direction} ({format_deviation(free)})") for free in o.free
     ).items():
-        others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
-        groups.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
+        others = dict.fromkeys(add_the(explanation.operations[j].part) for j in along)
+        groups.append(f"{join_words(words)} free{f' with {join_words(others)}' if others else ''}")
     if o.fixed:
-        groups.append(f"{listed_words(o.fixed)} fixed")
+        groups.append(f"{join_words(o.fixed)} fixed")
     return f"{o.part}: {'; '.join(groups)}"

@@ -10,7 +10,7 @@ from apo_bench.correction.explanation import Explanation, FreeDirection
 from apo_bench.correction.relation_equations import RelationHold
 from apo_bench.formats.json_forms import TO_MM_DEG, covariance_form, pose_form
 from apo_bench.geometry import Array
-from apo_bench.io import grouped
+from apo_bench.io import group_by
 
 _SCHEMA = "apo-bench/explanation/1"
 DOF_COLUMNS = {"operation": "d", "part": "", "fixed": "", "free": "", "relations": "", "agreeing": ""}
@@ -31,7 +31,7 @@ def dof_rows(explanation: Explanation) -> list[dict[str, Any]]:
     rows = []
     for o in explanation.operations:
         free = []
-        for along, some in grouped((direction.along, direction) for direction in o.free).items():
+        for along, some in group_by((direction.along, direction) for direction in o.free).items():
             names = ", ".join(f"{each.direction} {format_deviation(each)}" for each in some)
             others = dict.fromkeys(explanation.operations[j].part for j in along)
             free.append(f"{names}{' with ' * bool(others)}{', '.join(others)}")

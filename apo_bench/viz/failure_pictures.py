@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Poses, outline_points
+from apo_bench.assembly import Contact, Poses, list_outline_points
 from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
-from apo_bench.io import each_line
-from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, record_key, settings_of
+from apo_bench.io import read_lines
+from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, get_record_key, restore_settings
 from apo_bench.records.own_code import describe_own_code, own_code
 from apo_bench.records.run.replay_command import Files
 from apo_bench.records.run.validation import record_of
@@ -74,7 +74,7 @@ def _draw_failure(record: TrialRecord, folder: Path, files: Files, secret_seed: 
 
     name = record["scenario"]
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
-    config = replace(settings_of(record, files.get(name, name)), secret_seed=secret_seed)
+    config = replace(restore_settings(record, files.get(name, name)), secret_seed=secret_seed)
     scene = scene_of(config)
     draw_picture(scene, {}, 16, 12)  # fails at once where nothing can draw
     contact = _failed_contact(record, scene)
@@ -95,10 +95,10 @@ def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
     """The record as it is in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
     wanted = (f'"seed": {record["seed"]},'.encode(), json.dumps(record["config_hash"]).encode())
     path = folder / "trials.jsonl"
-    for number, line in each_line(path, "table of trials"):
+    for number, line in read_lines(path, "table of trials"):
         if all(part in line for part in wanted):
             whole = record_of(line, f"{path}, line {number}")
-            if record_key(whole) == record_key(record):
+            if get_record_key(whole) == get_record_key(record):
                 return whole
     return {}
 
@@ -137,7 +137,7 @@ def _mark(contact: Contact | None, scene: Any, poses: Poses) -> Any:
         return None
     assembly = scene.scenario.assembly
     of = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
-    middle = outline_points(assembly, of, poses).mean(axis=0)
+    middle = list_outline_points(assembly, of, poses).mean(axis=0)
     return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW)])
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 from apo_bench.perception.observation.models import MeasuredNoise, Residuals
 
 _OBSERVED = "#9fb8d1"
@@ -16,7 +16,7 @@ _BINS = 40
 _SHOWN = 0.995  # quantile up to which a histogram is drawn
 
 
-@default_looks()
+@use_figure_style()
 def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     """Write a PNG picture: across the ray, along it, turns; above, histograms; below, quantiles."""
     from matplotlib.figure import Figure

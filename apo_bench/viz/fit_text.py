@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io import columns
+from apo_bench.io import align_columns
 from apo_bench.perception.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, Split
 from apo_bench.viz.form_text import fact_lines
@@ -71,7 +71,7 @@ def fit_lines(form: Mapping[str, Any]) -> list[str]:
     for name, of in form["fit"].items():
         for head, word in ((f"{name} [{of['unit']}]", "observed"), ("", "fitted")):
             table.append((head, word, *(f"{value:.2f}" for value in of[word])))
-    return [*columns(facts), "", *columns(table), "", *_goodness_lines(form)]
+    return [*align_columns(facts), "", *align_columns(table), "", *_goodness_lines(form)]
 
 
 def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:

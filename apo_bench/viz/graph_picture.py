@@ -7,7 +7,7 @@ from statistics import fmean
 from typing import Any
 
 from apo_bench.assembly import ArcResiduals, Graph, Node
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 
 _INK = "#222222"
 _GONE = "#8A8A8A"
@@ -41,7 +41,7 @@ def place_nodes(graph: Graph) -> dict[Node, Place]:
     return places
 
 
-@default_looks({"svg.hashsalt": "apo-bench"})
+@use_figure_style({"svg.hashsalt": "apo-bench"})
 def draw_graph(
     graph: Graph,
     path: Path,

@@ -3,7 +3,7 @@
 from typing import Any
 
 from apo_bench.assembly import ArcResiduals, Graph, Node, spell
-from apo_bench.io import columns
+from apo_bench.io import align_columns
 
 _SCHEMA = "apo-bench/graph/1"
 
@@ -22,7 +22,7 @@ def graph_lines(graph: Graph, residuals: ArcResiduals, gap_m: float) -> list[str
         above = f", above {gap_m * 1e3:g}" if residual is not None and residual > gap_m else ""
         size = "" if residual is None else f"{residual * 1e3:.3f} mm{above}"
         arcs.append((str(arc), f"made {arc.made + 1}{lost}", f"[{' '.join(arc.pairs)}]", size))
-    return [*columns(nodes), "", *columns(arcs)]
+    return [*align_columns(nodes), "", *align_columns(arcs)]
 
 
 def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals) -> dict[str, Any]:

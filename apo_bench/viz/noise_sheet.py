@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Demonstration, placements
+from apo_bench.assembly import Demonstration, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.names import resolve
 from apo_bench.perception.observation.models import Camera, Facts
@@ -75,7 +75,7 @@ def nominal_demonstration() -> Demonstration:
     """The demonstration of an ideal human: the nominal poses of example 5.1, in the middle of their place."""
     scenario = load_scenario(SCENARIO)
     poses = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.goals
-    final = placements(scenario.assembly, scenario.start, poses)[-1]
+    final = compute_placements(scenario.assembly, scenario.start, poses)[-1]
     return Demonstration(scenario.assembly, scenario.start, poses, final, np.zeros((len(poses), 6, 6)))
 
 

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Plan, placements, spell
+from apo_bench.assembly import Plan, compute_placements, spell
 from apo_bench.formats.json_forms import pose_form
 from apo_bench.geometry import Array, pose
-from apo_bench.io import columns, direction
+from apo_bench.io import align_columns, format_direction
 from apo_bench.planning.insertion.arrival import Arrival, turning_state
 from apo_bench.planning.insertion.macros import Macro
 from apo_bench.planning.insertion.operation_macros import OperationMacros
-from apo_bench.scenario import Grasp, Scenario, nominal_operations, nominal_start
+from apo_bench.scenario import Grasp, Scenario, find_nominal_start, list_nominal_operations
 
 _SCHEMA = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
@@ -61,7 +61,7 @@ class PlanLine(NamedTuple):
 
 def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     """The steps of a plan."""
-    everything = nominal_operations(scenario)
+    everything = list_nominal_operations(scenario)
     odls = plan.assembly.odls()
     relations = [plan.assembly.relations()[arc[0]] for arc in plan.assembly.arcs()]
     lines = []
@@ -77,17 +77,17 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
 def plan_text(lines: Sequence[PlanLine]) -> list[str]:
     """A table of text, then what is wrong with single operations."""
     wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
-    return [*columns([_HEADS, *map(_cells, lines)]), *([""] if wrong else []), *wrong]
+    return [*align_columns([_HEADS, *map(_cells, lines)]), *([""] if wrong else []), *wrong]
 
 
-def plan_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
+def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
     """The JSON object: mm, degrees, operations from 1.
 
     Args:
         notes: Assumptions, and what speaks against the plan.
     """
-    start = nominal_start(scenario)
-    stages = (start, *placements(scenario.assembly, start, scenario.goals))
+    start = find_nominal_start(scenario)
+    stages = (start, *compute_placements(scenario.assembly, start, scenario.goals))
     forms = []
     for line in lines:
         stage = stages[line.operation if line.undo else line.operation + 1]
@@ -126,7 +126,7 @@ def _cells(line: PlanLine) -> tuple[str, ...]:
     macros = []
     for macro in line.macros:
         length = "" if macro.length_m is None else f" {1e3 * macro.length_m:.4g} mm"
-        macros.append(f"{macro.name} {direction(macro.direction)}{length}")
+        macros.append(f"{macro.name} {format_direction(macro.direction)}{length}")
     until = f"back at {line.back_to}"
     if line.target is not None:
         numbers = np.round([*(1e3 * line.target[:3, 3]), *pose.turn_deg(line.target)], 3) + 0.0
@@ -139,7 +139,7 @@ def _cells(line: PlanLine) -> tuple[str, ...]:
         f"{line.leaves.state.letter} -> {line.comes.state.letter}",
         ", ".join(macros) or ("-" if line.trouble else "put down"),
         line.came_from,
-        " ".join(map(direction, guarded)) or "-",
+        " ".join(map(format_direction, guarded)) or "-",
         _list_axes(position),
         _list_axes(across),
         f"({grasp}) across {_list_axes([line.grasp.across])}",
@@ -149,7 +149,7 @@ def _cells(line: PlanLine) -> tuple[str, ...]:
 
 def _list_axes(vectors: Iterable[Array]) -> str:
     """Axes without their sign."""
-    return " ".join(direction(v).lstrip("+-") for v in vectors) or "-"
+    return " ".join(format_direction(v).lstrip("+-") for v in vectors) or "-"
 
 
 def _state_form(arrival: Arrival) -> dict[str, Any]:

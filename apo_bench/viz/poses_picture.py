@@ -7,9 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Meetings, Observation, Poses, arc_residuals, placements, relation_graph
+from apo_bench.assembly import (
+    Meetings,
+    Observation,
+    Poses,
+    build_relation_graph,
+    compute_arc_residuals,
+    compute_placements,
+)
 from apo_bench.geometry import Array
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.scene import aim_camera, build_scene, draw_picture
@@ -38,15 +45,15 @@ class PosesPanel(NamedTuple):
 def poses_panel(title: str, observation: Observation, poses: Array, step: int, warning: str = "") -> PosesPanel:
     """The assembly at poses (n, 4, 4), world frame, [m], after so many operations."""
     assembly = observation.assembly
-    graph = relation_graph(assembly, step)
-    residuals = arc_residuals(assembly, observation.start, poses, graph)
-    placed = placements(assembly.first(step), observation.start, poses[:step])[-1]
+    graph = build_relation_graph(assembly, step)
+    residuals = compute_arc_residuals(assembly, observation.start, poses, graph)
+    placed = compute_placements(assembly.first(step), observation.start, poses[:step])[-1]
     wrong = []
     for e, arc in sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0]):
         if e > observation.gap_m:
             wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
     for arc in graph.arcs:
-        common = Meetings(assembly).overlaps((contact, placed) for contact in arc.contacts)
+        common = Meetings(assembly).measure_overlaps((contact, placed) for contact in arc.contacts)
         if arc.lost is None and not all(common):
             wrong.append(f"{arc}: no overlap")
     return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)
@@ -62,7 +69,7 @@ def poses_lines(panels: Sequence[PosesPanel]) -> list[str]:
     return lines
 
 
-@default_looks()
+@use_figure_style()
 def draw_poses(scenario: Scenario, step: int, panels: Sequence[PosesPanel], out: str | Path) -> None:
     """Write the panels side by side, from one point of view, as PNG.
 

@@ -13,8 +13,17 @@ from apo_bench.assembly import Plan
 from apo_bench.formats.json_forms import TO_MM_DEG
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.records import FtNoise, ft_noise
-from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search, search_laws
+from apo_bench.records import FtNoise, parse_ft_noise
+from apo_bench.simulation.execution import (
+    OPEN_TO_PICK_M,
+    STAND_OFF_M,
+    Grip,
+    Move,
+    Transfer,
+    plan_moves,
+    search,
+    search_laws,
+)
 from apo_bench.simulation.execution.probing import lay_flat, touching
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.places import (
@@ -25,22 +34,22 @@ from apo_bench.simulation.execution.probing.places import (
     wall_places,
 )
 from apo_bench.simulation.execution.probing.state import FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
-from apo_bench.simulation.robot import filtered_noise, low_pass_part
+from apo_bench.simulation.robot import compute_low_pass_gain, filter_noise
 from apo_bench.simulation.scene import Scene
-from apo_bench.viz.robot_form import pose_form, tip_form
+from apo_bench.viz.robot_form import format_robot_pose, tip_form
 
 
 def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
     """The JSON object: mm, N, Nm, s, degrees and unit vectors.
 
     Args:
-        sensor: Force-torque sensor of the wrist, as in `ft_noise`.
+        sensor: Force-torque sensor of the wrist, as in `parse_ft_noise`.
 
     Raises:
         InputError: An unknown sensor.
     """
-    noise = ft_noise(sensor)
-    filtered = filtered_noise(noise, low_pass_part())
+    noise = parse_ft_noise(sensor)
+    filtered = filter_noise(noise, compute_low_pass_gain())
     guard = touch_guard(filtered.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
     return {
@@ -76,7 +85,7 @@ def probing_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> 
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [_step(move, scene, frames, filtered) for move in moves(plan, scene, True, PROBING_ACTIONS)],
+        "steps": [_step(move, scene, frames, filtered) for move in plan_moves(plan, scene, True, PROBING_ACTIONS)],
     }
 
 
@@ -124,7 +133,7 @@ def _laid(t: Transfer, frames: RobotFrames, filtered: FtNoise) -> dict[str, Any]
     return {
         "when": "before the last motion" if t.into.level else "before it is carried",
         "at": tip_form(t.flat.T @ grip.T_part_tip, frames),
-        "part_in_tip": pose_form(pose.inverse(grip.T_part_tip), frames),
+        "part_in_tip": format_robot_pose(pose.inverse(grip.T_part_tip), frames),
         "feet_in_part_mm": [_mms(foot) for foot in t.flat.feet],
         **_plane(t.flat.normal, float(t.flat.normal @ foot), frames),
         "yield_deg_s_per_nm": _deg(lay_flat.turn_yield(t.flat)),

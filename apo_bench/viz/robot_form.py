@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Plan, Poses, placements
+from apo_bench.assembly import Plan, Poses, compute_placements
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.macros import UP
@@ -43,7 +43,7 @@ def robot_form(
         else:
             history.append(poses)
             one = type(assembly)(assembly.solids, (assembly.operations[line.operation],), assembly.fixed)
-            after = placements(one, poses, line.target[None])[0]
+            after = compute_placements(one, poses, line.target[None])[0]
         steps.append(_step(line, poses[line.what.main], after[line.what.main], plan, frames))
         poses = after
     to_base = pose.inverse(frames.T_world_base)
@@ -56,11 +56,11 @@ def robot_form(
             "position": "mm",
             "quaternion": frames.quaternion,
             "tip": "between the fingertips: z ahead, x along the direction in which the fingers close",
-            "base_in_world": pose_form(frames.T_world_base, frames),
-            "flange_to_tip": None if frames.T_flange_tip is None else pose_form(frames.T_flange_tip, frames),
+            "base_in_world": format_robot_pose(frames.T_world_base, frames),
+            "flange_to_tip": None if frames.T_flange_tip is None else format_robot_pose(frames.T_flange_tip, frames),
         },
         "parts": {
-            part: {"starts": pose_form(to_base @ T, frames), "fixed": part in plan.assembly.fixed}
+            part: {"starts": format_robot_pose(to_base @ T, frames), "fixed": part in plan.assembly.fixed}
             for part, T in plan.start.items()
         },
         "steps": steps,
@@ -83,7 +83,7 @@ def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFra
         "carries": list(line.what.carries),
         "makes": [str(contact) for contact in contacts],
         "grasp": {
-            "tip_in_part": pose_form(grip, frames),
+            "tip_in_part": format_robot_pose(grip, frames),
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
         "pick": {
@@ -92,7 +92,7 @@ def _step(line: PlanLine, here: Array, goal: Array, plan: Plan, frames: RobotFra
         },
         "motions": [*_departs(line, here, grip, frames), *_arrives(line, goal, grip, frames)],
         "leave": tip_form(_shift(end, end[:3, 2], -_ABOVE_M), frames),
-        "part_at_goal": pose_form(pose.inverse(frames.T_world_base) @ goal, frames),
+        "part_at_goal": format_robot_pose(pose.inverse(frames.T_world_base) @ goal, frames),
         "trouble": line.trouble or None,
     }
 
@@ -156,10 +156,10 @@ def _motion(
 def tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
     """A pose of the tip, or of the flange that carries it, in the frame of the base."""
     T = pose.inverse(frames.T_world_base) @ T_world_tip
-    return pose_form(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
+    return format_robot_pose(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
 
 
-def pose_form(T: Array, frames: RobotFrames) -> dict[str, Any]:
+def format_robot_pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
     """A pose in mm, with the quaternion in the order of the robot."""
     packed = pose.pack(T)
     q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)

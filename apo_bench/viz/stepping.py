@@ -6,11 +6,11 @@ from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.assembly import PartFace, placements
+from apo_bench.assembly import PartFace, compute_placements
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
-from apo_bench.simulation.film.overlay import Color, Overlay, Snapshot
-from apo_bench.simulation.film.track import FilmMoment, Segment, part_poses
+from apo_bench.simulation.film.overlay import Color, FilmSnapshot, Overlay
+from apo_bench.simulation.film.track import FilmMoment, Segment, read_part_poses
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout
 
 Faces = Literal["none", "this operation", "all"]
@@ -52,9 +52,9 @@ class Cursor:
     def _is_last(self) -> bool:
         return self.moment is self.segment.moments[-1]
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> FilmSnapshot:
         """What is shown here."""
-        return Snapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
+        return FilmSnapshot(self.segment, self.moment, self.words(), self._faces(), self._overlays())
 
     def press(self, key: str) -> None:
         """Do what a key means, one of `WINDOW_KEYS`."""
@@ -108,7 +108,7 @@ class Cursor:
             return []
         placed = {name: poses[k] for name, poses in self.rollout.goals.items()}
         true = placed.pop(AS_TRUE)
-        placed["as it is now"] = part_poses(self.segment, self.moment)[self._assembly.operations[k].main]
+        placed["as it is now"] = read_part_poses(self.segment, self.moment)[self._assembly.operations[k].main]
         lines = []
         for name, T in placed.items():
             twist = pose.log(pose.inverse(true) @ T)
@@ -141,6 +141,6 @@ class Cursor:
         moved = {part for operation in begun.operations for part in operation.moves}
         overlays = []
         for name, goals in self.rollout.goals.items():
-            poses = placements(begun, self.segment.start, goals[: k + 1])[-1]
+            poses = compute_placements(begun, self.segment.start, goals[: k + 1])[-1]
             overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)

@@ -5,9 +5,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from apo_bench.assembly import Layout, joint_play_mm, placements, relation_graph
+from apo_bench.assembly import Layout, build_relation_graph, compute_joint_play_mm, compute_placements
 from apo_bench.geometry import Array
-from apo_bench.io import listed_words
+from apo_bench.io import join_words
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
 from apo_bench.viz.form_text import format_value
@@ -37,11 +37,11 @@ def _bullets(lines: Iterable[str]) -> str:
 
 def _describe_operations(scenario: Scenario) -> Iterator[str]:
     """`5. stick: R6 stick -> cube2 (py-hpy, ...), R7 ...; ends R2`."""
-    graph = relation_graph(scenario.assembly)
+    graph = build_relation_graph(scenario.assembly)
     for k, operation in enumerate(scenario.assembly.operations):
         made = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in graph.arcs if arc.made == k)
         ended = ", ".join(arc.name for arc in graph.arcs if arc.lost == k)
-        carried = f" with {listed_words(operation.carries)}" if operation.carries else ""
+        carried = f" with {join_words(operation.carries)}" if operation.carries else ""
         yield f"{k + 1}. {operation.main}{carried}: {made or 'no contact'}{ended and f'; ends {ended}'}"
 
 
@@ -54,7 +54,7 @@ def _describe_human_error(scenario: Scenario) -> str:
     mains = [operation.main for operation in scenario.assembly.operations]
     astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)
     followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
-    follow = f"; {listed_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
+    follow = f"; {join_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
     return (
         f"At `human_error_scale` 1, operation {error.operation + 1} displaces {mains[error.operation]} by "
         f"{_format_span(error.low_m, error.high_m)} mm along {_name_axis(error.axis)}, to either side{follow}; "
@@ -87,7 +87,7 @@ def _describe_success(scenario: Scenario) -> list[str]:
         f"Success means: {scenario.success_means.replace('_', ' ')}.": True,
         f"Thresholds, at {scenario.clearance_mm:g} mm clearance per side: {thresholds}.": True,
         f"Some faces have more play, so they may be farther apart: {wider}.": wider,
-        f"Fixtures, which may end anywhere: {listed_words(away)}.": away,
+        f"Fixtures, which may end anywhere: {join_words(away)}.": away,
         f"Contact equations count as solved below {scenario.gap_mm:g} mm.": True,
     }
     return [sentence for sentence, holds in facts.items() if holds]
@@ -96,9 +96,9 @@ def _describe_success(scenario: Scenario) -> list[str]:
 def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
     """Contacts whose play is larger than the clearance, and their play [mm], at the nominal poses."""
     assembly = scenario.assembly
-    history = placements(assembly, scenario.start, scenario.goals)
+    history = compute_placements(assembly, scenario.start, scenario.goals)
     for contact, operation, _ in assembly.relations():
-        play = joint_play_mm(assembly, contact, operation, history[operation], scenario.clearance_mm)
+        play = compute_joint_play_mm(assembly, contact, operation, history[operation], scenario.clearance_mm)
         if play is not None and play > scenario.clearance_mm:
             yield str(contact), play
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from apo_bench.errors import InputError
-from apo_bench.io import each_line
-from apo_bench.records import TrialConfig, TrialRecord, read_secret_seed, settings_of
+from apo_bench.io import read_lines
+from apo_bench.records import TrialConfig, TrialRecord, read_secret_seed, restore_settings
 from apo_bench.records.own_code import own_code
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.validation import record_of
@@ -35,7 +35,7 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
             "run; run the trial yourself with `apo-bench run .. --view`."
         )
     name = record["scenario"]
-    config = settings_of(record, scenario_files(read_run(folder)).get(name, name))
+    config = restore_settings(record, scenario_files(read_run(folder)).get(name, name))
     if secret_seed_file is not None:
         config = replace(config, secret_seed=read_secret_seed(secret_seed_file))
     if reason := why_different(record, config):
@@ -66,7 +66,7 @@ def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:
     path = folder / "trials.jsonl"
     first = None
     count = 0
-    for count, line in each_line(path, "table of trials"):
+    for count, line in read_lines(path, "table of trials"):
         if number in (None, count):
             record = record_of(line, f"{path}, line {count}")
             if number is not None or (record["success"] is False and record["sim_time_s"] is not None):

@@ -9,10 +9,18 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly
-from apo_bench.assembly import Contact, Equations, Operation, PartFace, contact_equations, largest_gap, placements
-from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
+from apo_bench.assembly import (
+    Contact,
+    Equations,
+    Operation,
+    PartFace,
+    build_contact_equations,
+    compute_placements,
+    measure_largest_gap,
+)
+from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, compute_least_step, displacement
 from apo_bench.geometry import Array, pose
-from apo_bench.geometry.covering import overlap
+from apo_bench.geometry.covering import compute_overlap
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -59,7 +67,7 @@ def long_words() -> scenes.Scene:
 
 def differences(scene: scenes.Scene, by: float = 1e-6) -> tuple[Array, Array]:
     """The analytic Jacobian and the one of central differences, by body twists of every goal."""
-    system = contact_equations(scene.assembly, scene.start, scene.goals)
+    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
     _, J = system.linearise(scene.goals)
     numeric = np.zeros_like(J)
     for k in range(len(scene.goals)):
@@ -83,15 +91,15 @@ def test_jacobian_of_random_assemblies(seed: int) -> None:
 @pytest.mark.parametrize("build", scenes.ALL.values())
 def test_no_gap_at_the_truth(build) -> None:
     scene = build()
-    assert largest_gap(scene.assembly, scene.start, scene.goals) < 1e-15
+    assert measure_largest_gap(scene.assembly, scene.start, scene.goals) < 1e-15
 
 
 @given(st.integers(0, 10**6))
 @settings(max_examples=20, deadline=None)
 def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
     scene = random_scene(seed)
-    e = contact_equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
-    history = placements(scene.assembly, scene.start, scene.goals)
+    e = build_contact_equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
+    history = compute_placements(scene.assembly, scene.start, scene.goals)
     row = 0
     for contact, made, _ in scene.assembly.relations():
         m, b = contact
@@ -111,7 +119,7 @@ def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) ->
 
 
 def scenes_area(face) -> float:
-    return overlap(face, np.eye(4), face, np.eye(4)).area
+    return compute_overlap(face, np.eye(4), face, np.eye(4)).area
 
 
 @given(st.integers(0, 10**6))
@@ -119,15 +127,15 @@ def scenes_area(face) -> float:
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     scene = random_scene(seed)
     moved = scenes.turned(scene, pose.exp(np.random.default_rng(seed).standard_normal(6)))
-    e, J = contact_equations(scene.assembly, scene.start, scene.goals).linearise(scene.goals)
-    e_moved, J_moved = contact_equations(moved.assembly, moved.start, moved.goals).linearise(moved.goals)
+    e, J = build_contact_equations(scene.assembly, scene.start, scene.goals).linearise(scene.goals)
+    e_moved, J_moved = build_contact_equations(moved.assembly, moved.start, moved.goals).linearise(moved.goals)
     assert_allclose(e_moved, e, atol=1e-12)
     assert_allclose(J_moved, J, atol=1e-12)
 
 
 def test_gap_is_positive_and_penetration_negative() -> None:
     scene = scenes.stick_on_castles()
-    system = contact_equations(scene.assembly, scene.start, scene.goals)
+    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
     for height, sign in ((2.0, 1.0), (-2.0, -1.0)):
         moved = scene.goals.copy()
         moved[0] = moved[0] @ scenes.mm(0, 0, height)
@@ -150,10 +158,10 @@ def with_free(system: Equations, free: set[int] | None) -> Equations:
 def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) -> None:
     scene = scenes.ALL[name]()
     columns = range(len(scene.goals)) if free is None else free
-    e, J = with_free(contact_equations(scene.assembly, scene.start, scene.goals), free).linearise(scene.goals)
+    e, J = with_free(build_contact_equations(scene.assembly, scene.start, scene.goals), free).linearise(scene.goals)
     chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
     scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
-    assert [least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]
+    assert [compute_least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]
 
 
 @given(st.integers(0, 10**6))
@@ -162,7 +170,7 @@ def test_least_step_is_the_pseudo_inverse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     J = rng.standard_normal((8, 3)) @ rng.standard_normal((3, 6))
     e = rng.standard_normal(8)
-    step, rank = least_step(J, e, 1e-9)
+    step, rank = compute_least_step(J, e, 1e-9)
     assert rank == 3
     assert_allclose(step, -np.linalg.pinv(J, rcond=1e-9) @ e, atol=1e-9)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Graph, arc_residuals, largest_gap, relation_graph, spell
+from apo_bench.assembly import Graph, build_relation_graph, compute_arc_residuals, measure_largest_gap, spell
 from tests import scenes
 
 FIG_7 = {
@@ -41,12 +41,12 @@ def odl(graph: Graph, arc: int) -> tuple[str, str]:
 
 @pytest.mark.parametrize("step", FIG_7)
 def test_the_nodes_of_fig_7(step: int) -> None:
-    graph = relation_graph(scenes.pockets().assembly, step)
+    graph = build_relation_graph(scenes.pockets().assembly, step)
     assert (graph.step, " | ".join(map(str, graph.nodes))) == (step, FIG_7[step])
 
 
 def test_the_arcs_of_fig_7() -> None:
-    graph = relation_graph(scenes.pockets().assembly)
+    graph = build_relation_graph(scenes.pockets().assembly)
     found = {
         str(arc): (*odl(graph, i), arc.made + 1, None if arc.lost is None else arc.lost + 1)
         for i, arc in enumerate(graph.arcs)
@@ -56,7 +56,7 @@ def test_the_arcs_of_fig_7() -> None:
 
 
 def test_the_vanished_fixture_keeps_its_place() -> None:
-    graph = relation_graph(scenes.fixture().assembly)
+    graph = build_relation_graph(scenes.fixture().assembly)
     assert [str(arc) for arc in graph.arcs] == [
         "R1 castle1 -> table", "R2 cube -> table", "R3 castle2 -> table", "R4 castle2 -> cube",
         "R5 cube -> table", "R6 stick -> castle1", "R7 stick -> castle2",
@@ -70,8 +70,8 @@ def test_every_arc_is_in_the_graph_with_its_equations(name: str) -> None:
     """Ends are nodes; an arc that stands joins what stands; the operations are those of the ODLs when it was made."""
     assembly = scenes.ALL[name]().assembly
     for step in range(1, len(assembly) + 1):
-        graph = relation_graph(assembly, step)
-        made = {arc.name: relation_graph(assembly, arc.made + 1) for arc in graph.arcs}
+        graph = build_relation_graph(assembly, step)
+        made = {arc.name: build_relation_graph(assembly, arc.made + 1) for arc in graph.arcs}
         for i, arc in enumerate(graph.arcs):
             assert {arc.manipulated, arc.environment} <= set(graph.nodes)
             if arc.lost is None:
@@ -86,8 +86,8 @@ def test_arcs_hold_at_the_truth_and_the_worst_is_the_gap(name: str) -> None:
     scene = scenes.ALL[name]()
     seen = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
     for step in range(1, len(scene.goals) + 1):
-        graph = relation_graph(scene.assembly, step)
+        graph = build_relation_graph(scene.assembly, step)
         done = scene.assembly.first(step)
-        assert max(arc_residuals(scene.assembly, scene.start, scene.goals, graph)) < 1e-12
-        worst = max(arc_residuals(scene.assembly, scene.start, seen, graph))
-        assert worst == pytest.approx(largest_gap(done, scene.start, seen[:step]), rel=1e-9)
+        assert max(compute_arc_residuals(scene.assembly, scene.start, scene.goals, graph)) < 1e-12
+        worst = max(compute_arc_residuals(scene.assembly, scene.start, seen, graph))
+        assert worst == pytest.approx(measure_largest_gap(done, scene.start, seen[:step]), rel=1e-9)

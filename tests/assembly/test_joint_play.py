@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import Contact, Meetings, Poses, contact_kind, joint_play_mm, placements
-from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.assembly import Contact, Meetings, Poses, classify_contact, compute_joint_play_mm, compute_placements
+from apo_bench.geometry import measure_intrusion_depths, pose
 from apo_bench.judging.contacts import ContactCase, ContactJudge
 from apo_bench.planning.prediction.interference import physical_solids
 from apo_bench.records import Thresholds
@@ -34,7 +34,7 @@ WALLS_MM = 0.02
 
 def pairs(scenario: Scenario) -> Iterator[Pair]:
     assembly = scenario.assembly
-    history = placements(assembly, scenario.start, scenario.goals)
+    history = compute_placements(assembly, scenario.start, scenario.goals)
     relations = assembly.relations()
     for arc in assembly.arcs():
         made = relations[arc[0]].made
@@ -46,7 +46,7 @@ def plays(name: str) -> dict[str, float]:
     found = {}
     for contacts, made, true in pairs(scenario):
         for contact in contacts:
-            play = joint_play_mm(scenario.assembly, contact, made, true, scenario.clearance_mm)
+            play = compute_joint_play_mm(scenario.assembly, contact, made, true, scenario.clearance_mm)
             if play is not None:
                 found[str(contact)] = play
     return found
@@ -55,9 +55,9 @@ def plays(name: str) -> dict[str, float]:
 def test_the_play_between_the_walls_of_a_slot_is_the_clearance() -> None:
     """The stick between two parallel walls; its floor, with nothing above it, bounds nothing."""
     scene = CASTLES()
-    true = placements(scene.assembly, scene.start, scene.goals)[-1]
+    true = compute_placements(scene.assembly, scene.start, scene.goals)[-1]
     found = [
-        joint_play_mm(scene.assembly, contact, 2, true, CLEARANCE_MM)
+        compute_joint_play_mm(scene.assembly, contact, 2, true, CLEARANCE_MM)
         for contact in scene.assembly.operations[2].contacts
     ]
     assert found == [None, CLEARANCE_MM, CLEARANCE_MM] * 2
@@ -97,7 +97,7 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
         T = after(share)[moved]
         a = solids[moved].pieces
         b = solids[rests].pieces
-        return float(intrusion_depths(a, T[:3, :3], T[None, :3, 3], b, start[rests])[0])
+        return float(measure_intrusion_depths(a, T[:3, :3], T[None, :3, 3], b, start[rests])[0])
 
     if depth(1.0) <= limit_m:
         return None
@@ -123,8 +123,8 @@ def bounded(scenario: Scenario, pair: Pair) -> list[Contact]:
     return [
         c
         for c in contacts
-        if contact_kind(*map(assembly.face_of, c)) == "shaft in hole"
-        or joint_play_mm(assembly, c, made, true, scenario.clearance_mm) is not None
+        if classify_contact(*map(assembly.face_of, c)) == "shaft in hole"
+        or compute_joint_play_mm(assembly, c, made, true, scenario.clearance_mm) is not None
     ]
 
 

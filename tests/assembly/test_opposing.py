@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import correct, correct_many
-from apo_bench.assembly import faces_away, placements
+from apo_bench.assembly import compute_placements, find_faces_away
 from apo_bench.assembly.contact_kinds import OPPOSING
 from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import pose
@@ -27,13 +27,13 @@ def turned(name, k, turn, seed=0):
 def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name):
     scenario, layout, _ = shown(name)
     assembly = scenario.assembly
-    assert not faces_away(assembly, layout.start, layout.poses).any()
+    assert not find_faces_away(assembly, layout.start, layout.poses).any()
     goals = np.array(layout.poses)
     goals[-1] = goals[-1] @ pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
-    both = faces_away(assembly, layout.start, np.array([layout.poses, goals]))
+    both = find_faces_away(assembly, layout.start, np.array([layout.poses, goals]))
     assert not both[0].any()
     for k, (operation, at) in enumerate(
-        zip(assembly.operations, placements(assembly, layout.start, goals), strict=True)
+        zip(assembly.operations, compute_placements(assembly, layout.start, goals), strict=True)
     ):
         for m, e in operation.contacts:
             i = next(i for i, r in enumerate(assembly.relations()) if r.contact == (m, e) and r.made == k)
@@ -47,9 +47,9 @@ def test_nothing_converges_where_a_part_was_seen_turned_over(name):
     scenario, layout, _ = shown(name)
     seen = [turned(name, k, turn) for k in range(len(scenario.assembly)) for turn in TURNS]
     for made in correct_many(seen[::7], contact):
-        assert not made.ok or not faces_away(scenario.assembly, layout.start, made.poses).any()
+        assert not made.ok or not find_faces_away(scenario.assembly, layout.start, made.poses).any()
     for corrector in ("paper", "contact-drop", "snap", "contact-robust"):
         for one in seen[::13]:
             made = correct(one, corrector)
             kept = scenario.assembly.without(made.dropped)
-            assert not made.ok or not faces_away(scenario.assembly, layout.start, made.poses)[kept].any()
+            assert not made.ok or not find_faces_away(scenario.assembly, layout.start, made.poses)[kept].any()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import SharedError, first_order, joint_covariance
+from apo_bench.assembly import SharedError, compute_joint_covariance, correlate_first_order
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
@@ -34,13 +34,13 @@ def test_what_is_shared_stands_beside_the_diagonal() -> None:
     camera = SharedError("camera", (0, 2), C, P)
     stated = own.copy()
     stated[[0, 2]] += camera.added(GOALS)
-    joint = joint_covariance(GOALS, stated, [camera]).reshape(3, 6, 3, 6)
+    joint = compute_joint_covariance(GOALS, stated, [camera]).reshape(3, 6, 3, 6)
     A = camera.ways(GOALS)
     assert_allclose(joint[0, :, 2], A[0] @ C @ A[1].T, atol=1e-18)
     assert not joint[1, :, [0, 2]].any()
     assert_allclose(joint[np.arange(3), :, np.arange(3)], stated, atol=1e-18)
-    drift = SharedError("drift", (0, 1, 2), C, correlation=first_order(3, 0.9))
-    joint = joint_covariance(GOALS, own + C, [drift]).reshape(3, 6, 3, 6)
+    drift = SharedError("drift", (0, 1, 2), C, correlation=correlate_first_order(3, 0.9))
+    joint = compute_joint_covariance(GOALS, own + C, [drift]).reshape(3, 6, 3, 6)
     assert_allclose(joint[0, :, 2], 0.81 * C, atol=1e-18)
 
 
@@ -54,7 +54,7 @@ def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     for seed in range(600):
         seen = noise(shown.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.poses) @ shown.poses).ravel()
-        joint = joint_covariance(seen.poses, seen.covariance, seen.shared)
+        joint = compute_joint_covariance(seen.poses, seen.covariance, seen.shared)
         square.append(xi @ np.linalg.solve(joint, xi))
     freedom = 6 * len(scene.goals)
     assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 600) + 0.02 * freedom)

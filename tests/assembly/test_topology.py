@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly
-from apo_bench.assembly import Operation, invert, placements, product, simplify, spell
+from apo_bench.assembly import Operation, compute_placements, evaluate_odl, invert, simplify_odl, spell
 from apo_bench.assembly.topology import Term
 from apo_bench.geometry import pose
 from tests import scenes
@@ -56,8 +56,8 @@ TERMS = st.lists(st.builds(Term, st.integers(0, 3), st.booleans()), max_size=8)
 @settings(max_examples=40, deadline=None)
 def test_products(odl: list[Term], seed: int) -> None:
     goals = pose.exp(np.random.default_rng(seed).standard_normal((4, 6)))
-    assert_allclose(product(simplify(odl), goals), product(odl, goals), atol=1e-9)
-    assert_allclose(product(invert(odl), goals) @ product(odl, goals), np.eye(4), atol=1e-9)
+    assert_allclose(evaluate_odl(simplify_odl(odl), goals), evaluate_odl(odl, goals), atol=1e-9)
+    assert_allclose(evaluate_odl(invert(odl), goals) @ evaluate_odl(odl, goals), np.eye(4), atol=1e-9)
 
 
 def test_spelled_counts_from_one() -> None:
@@ -69,8 +69,10 @@ def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:
     for build in scenes.ALL.values():
         scene = build()
         goals = scenes.noisy(scene.goals, np.random.default_rng(1), 20.0, 20.0)
-        for odls, poses in zip(scene.assembly.odls(), placements(scene.assembly, scene.start, goals), strict=True):
+        for odls, poses in zip(
+            scene.assembly.odls(), compute_placements(scene.assembly, scene.start, goals), strict=True
+        ):
             for part, odl in odls.items():
-                assert_allclose(poses[part], product(odl, goals), atol=1e-12)
+                assert_allclose(poses[part], evaluate_odl(odl, goals), atol=1e-12)
             for part in set(poses) - set(odls):
                 assert poses[part] is scene.start[part]

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, Observation
-from apo_bench.assembly import Try, contact_equations, placements
+from apo_bench.assembly import FreeingTrial, build_contact_equations, compute_placements
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import paper_track
 from apo_bench.geometry import Array, pose
@@ -62,7 +62,7 @@ def test_a_set_without_the_newest_has_to_correct_what_it_opens() -> None:
     """{2} would close every equation of its own and leave the stick one clearance low in castle 1."""
     found = minimal(observe("stick_in_tower", low_mm=0.25))
     assert freed(found) == (3, 2)
-    assert Try(2, (1,), pytest.approx(2.5e-4)) in found.tried  # type: ignore[arg-type]
+    assert FreeingTrial(2, (1,), pytest.approx(2.5e-4)) in found.tried  # type: ignore[arg-type]
 
 
 def test_sets_come_by_size_then_by_recency_up_to_a_limit() -> None:
@@ -86,7 +86,7 @@ def test_without_history_the_stick_of_example_5_2_keeps_its_observed_pose_in_the
     given = observe("subassembly_on_castles", noise_level=1.0)
 
     def stick_in_cube(poses: Array) -> Array:
-        placed = placements(given.assembly, given.start, poses)[-1]
+        placed = compute_placements(given.assembly, given.start, poses)[-1]
         return pose.inverse(placed["cube"]) @ placed["stick"]
 
     found = no_history(given)
@@ -97,7 +97,7 @@ def test_without_history_the_stick_of_example_5_2_keeps_its_observed_pose_in_the
 def test_without_lost_contacts_the_fixture_of_example_5_3_stays_wrong() -> None:
     given = observe("fixture")
     found, whole = no_disappeared(given), paper(given)
-    system = contact_equations(given.assembly, given.start, given.poses)
+    system = build_contact_equations(given.assembly, given.start, given.poses)
     against = [str(relation.contact) for relation in given.assembly.relations()].index("castle2.py on cube.ny")
     assert (found.status, freed(found), freed(whole)) == ("converged", (5, 3, 1), (5, 3, 2, 1))
     assert_array_equal(found.poses[1], given.poses[1])

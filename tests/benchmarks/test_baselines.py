@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from benchmarks.baselines import FAILS, HALF, Count, Place, count, describe, read_counts
 from benchmarks.provenance import share_of_sweep, trials_of
 
@@ -37,7 +37,7 @@ def test_nominal_poses_fail_in_eight_scenarios_and_snap_in_three_that_it_once_so
 
 def test_a_task_sheet_says_what_the_counts_mean() -> None:
     counts = {place: Count(10, 10) for place in read_counts()}
-    assert set(scenario_names()) == {place.scenario for place in counts}
+    assert set(list_scenario_names()) == {place.scenario for place in counts}
     tower = load_scenario("stick_in_tower")
     assert "`snap` is enough" in describe(tower, counts)
     assert "Nominal poses are enough (10 of 10 at 4 mm): the assembly stands" in describe(tower, counts)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import correct
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from benchmarks.corrector import MANY, METHODS, find_optimum, measure, whitened
 from benchmarks.corrector_problems import observe, problem
 
@@ -28,7 +28,7 @@ def test_contact_makes_the_shortest_correction_that_closes_every_contact(name: s
 @pytest.mark.parametrize("name", ["fig2", "chain3", "grid2"])
 def test_problems_are_consistent(name: str) -> None:
     of = problem(name)
-    assert contact_equations(of.assembly, of.start, of.poses).gaps(of.poses).max() < 1e-12
+    assert build_contact_equations(of.assembly, of.start, of.poses).gaps(of.poses).max() < 1e-12
 
 
 def test_every_method_is_timed() -> None:

@@ -15,7 +15,7 @@ from apo_bench.cli import app as cli
 from apo_bench.cli.method import METHODS as DESCRIBED
 from apo_bench.records import METHODS, RECORD_SCHEMA
 from apo_bench.records.run.run_folder import read_records
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 
 SEEN = Path(__file__).parents[2] / "docs" / "seen.csv"
 TRIAL = ("run", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "uncorrected")
@@ -39,7 +39,7 @@ def first_words(text: str) -> list[str]:
 
 def test_everything_can_be_listed(capsys: pytest.CaptureFixture[str]) -> None:
     for group, known in (
-        ("scenario", scenario_names()),
+        ("scenario", list_scenario_names()),
         ("method", (*METHODS, "spiral-search")),
         ("noise", ("isotropic", "outliers", "megapose-lmo")),
         ("arm", ("six_axis", "ur5e_primitive")),
@@ -152,17 +152,17 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
 def test_the_default_method_is_the_same_everywhere() -> None:
     from inspect import signature
 
-    from apo_bench import Corrected, SweepConfig, TrialConfig, correct
+    from apo_bench import CorrectPoses, SweepConfig, TrialConfig, correct
     from apo_bench.cli.correct_command import correct_command
     from apo_bench.cli.inspect_poses import poses_command
-    from apo_bench.cli.shared import trial_options
+    from apo_bench.cli.shared import make_trial_options
     from apo_bench.records import CORRECTOR
 
     commands = [signature(command).parameters["method"].default for command in (correct_command, poses_command)]
-    functions = [signature(function).parameters["corrector"].default for function in (Corrected, correct)]
+    functions = [signature(function).parameters["corrector"].default for function in (CorrectPoses, correct)]
     assert {*commands, *functions, TrialConfig("").method} == {CORRECTOR}
     assert CORRECTOR in SweepConfig(("stick_in_tower",)).method
-    assert f"default: {CORRECTOR}." in trial_options("method")[0].annotation.__metadata__[0].help
+    assert f"default: {CORRECTOR}." in make_trial_options("method")[0].annotation.__metadata__[0].help
 
 
 def test_json_is_exactly_one_record(capsys: pytest.CaptureFixture[str]) -> None:

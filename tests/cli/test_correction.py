@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Correction, Observation, load_scenario, read_observation
-from apo_bench.assembly import largest_gap
+from apo_bench.assembly import measure_largest_gap
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
 
@@ -134,7 +134,7 @@ def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str],
     scenario = load_scenario("stick_in_tower")
     seen = read_observation(SEEN, scenario)
     goals = read_observation(path, scenario).poses if ending == "csv" else planned(path)
-    assert largest_gap(seen.assembly, seen.start, goals) < 1e-12
+    assert measure_largest_gap(seen.assembly, seen.start, goals) < 1e-12
     stated = [pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in made["operations"]]
     assert goals == pytest.approx(np.array(stated), abs=1e-12)
     assert (made["status"], made["rank"], made["freedom"], made["test"]["passes"]) == ("converged", 13, 5, True)

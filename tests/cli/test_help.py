@@ -12,13 +12,13 @@ import pytest
 import typer
 
 from apo_bench.cli.app import app, main
-from apo_bench.cli.shared import GROUPS, OPTIONS, completion
+from apo_bench.cli.shared import GROUPS, OPTIONS, complete_last_word
 from apo_bench.cli.shared.completion import offered_names
 from apo_bench.cli.shared.help import OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.records.contact_sources import checked_contact_source
 from apo_bench.records.methods import checked_method
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
 
@@ -84,7 +84,7 @@ def test_every_option_stands_under_one_heading_and_whole(command: str, capsys: p
 
 
 def test_offered_names_are_the_known_names() -> None:
-    assert tuple(offered_names("scenario")) == scenario_names()
+    assert tuple(offered_names("scenario")) == list_scenario_names()
     assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
     assert [checked_method(name) for name in offered_names("method")] == offered_names("method")
     assert [checked_contact_source(name) for name in offered_names("contact_source") if name != "shifted"]
@@ -94,7 +94,7 @@ def test_offered_names_are_the_known_names() -> None:
 
 
 def test_after_a_comma_a_name_that_is_there_is_not_offered_again() -> None:
-    offered = completion("method")
+    offered = complete_last_word("method")
     assert offered("contact-r") == ["contact-refuse", "contact-robust"]
     assert offered("contact-refuse,contact-r") == ["contact-refuse,contact-robust"]
     assert offered("x") == []

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from apo_bench import Plan, Scenario, build_scene, draw_layout, load_scenario
-from apo_bench.assembly import Step, placements
+from apo_bench.assembly import Step, compute_placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
-from apo_bench.io import direction
+from apo_bench.io import format_direction
 from apo_bench.planning.insertion.operation_macros import understand
-from apo_bench.scenario.attach_lines import nominal_operations
-from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.layout import nominal_start
-from apo_bench.simulation.execution.prepare import moves
-from apo_bench.viz.plan_text import plan_form, plan_lines, plan_text
+from apo_bench.scenario.attach_lines import list_nominal_operations
+from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.layout import find_nominal_start
+from apo_bench.simulation.execution.prepare import plan_moves
+from apo_bench.viz.plan_text import describe_plan, plan_lines, plan_text
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]
@@ -110,28 +110,28 @@ def nominal(scenario: Scenario) -> Plan:
 
 def unstated(scenario: Scenario) -> list[tuple[str, list[str]]]:
     """States and macros found without any stated line of attach."""
-    found = understand(scenario.assembly, nominal_start(scenario), scenario.goals)
+    found = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals)
     return [
         (
             f"{each.before.state.letter} -> {each.after.state.letter}",
-            [f"{m.name} {direction(m.direction)}" for m in (*each.before.departs, *each.after.macros)],
+            [f"{m.name} {format_direction(m.direction)}" for m in (*each.before.departs, *each.after.macros)],
         )
         for each in found
     ]
 
 
 def test_the_table_covers_every_scenario() -> None:
-    assert set(TABLE) == set(scenario_names())
+    assert set(TABLE) == set(list_scenario_names())
 
 
 @pytest.mark.parametrize("name", TABLE)
 def test_states_and_macros_of_every_operation(name: str) -> None:
     scenario = load_scenario(name)
-    form = plan_form(plan_lines(nominal(scenario), scenario), scenario)
+    form = describe_plan(plan_lines(nominal(scenario), scenario), scenario)
     found = [
         (
             f"{step['before']['letter']} -> {step['after']['letter']}",
-            [f"{m['name']} {direction(np.array(m['direction']))}" for m in step["macros"]],
+            [f"{m['name']} {format_direction(np.array(m['direction']))}" for m in step["macros"]],
         )
         for step in form["steps"]
     ]
@@ -230,8 +230,8 @@ def test_undoing_reverses_the_macros() -> None:
     plan = Plan(scenario.assembly, scenario.start, goals, schedule)
     *_, stick, cube = plan_lines(plan, scenario)
     assert [m.name for m in stick.macros] == ["depart"]
-    assert direction(stick.macros[0].direction) == "+z"
-    assert [(m.name, direction(m.direction)) for m in cube.macros] == [
+    assert format_direction(stick.macros[0].direction) == "+z"
+    assert [(m.name, format_direction(m.direction)) for m in cube.macros] == [
         ("move-to-contact", "-z"),
         ("slide-to-contact", "-y"),
     ]
@@ -242,9 +242,9 @@ def test_undoing_reverses_the_macros() -> None:
 def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng([5, 0]))
-    done = moves(Plan(scenario.assembly, layout.start, layout.poses), build_scene(scenario))
-    stages = placements(scenario.assembly, layout.start, layout.poses)
-    for move, what in zip(done, nominal_operations(scenario), strict=True):
+    done = plan_moves(Plan(scenario.assembly, layout.start, layout.poses), build_scene(scenario))
+    stages = compute_placements(scenario.assembly, layout.start, layout.poses)
+    for move, what in zip(done, list_nominal_operations(scenario), strict=True):
         t = move.transfer
         T = stages[what.operation][what.main]
         assert [motion.name for motion in t.macros] == [macro.name for macro in what.after.macros]

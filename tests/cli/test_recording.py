@@ -11,7 +11,7 @@ import pytest
 from apo_bench import load_scenario, read_observation
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from tests.importers.recording.log_forms import FORMS, Tracked
 from tests.recorded import CAMERA, seen
 
@@ -38,7 +38,7 @@ def run(folder: Path, *more: str) -> int:
 
 
 def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).poses
+    wanted = place_layout(load_scenario(NAME), 0.1, 0.0, 0.3).poses
     extra = ("--picture", str(folder / "p.png"), "--paths", str(folder / "p.csv"))
     for out, more in (("a.json", ("--scenario", NAME, *extra)), ("a.csv", ("--scenario", NAME)), ("b.csv", ())):
         assert run(folder, "--out", str(folder / out), *more) == 0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Observation, Scenario, explain, load_scenario
-from apo_bench.assembly import contact_equations, placements
+from apo_bench.assembly import build_contact_equations, compute_placements
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.directions import directions
 from apo_bench.correction.explanation import Explanation
@@ -37,7 +37,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
     """What is left of the contacts when goal k has moved and some later ones adapt."""
     goals = np.array(seen.poses)
     goals[k] = goals[k] @ pose.exp(STEP * twist)
-    system = contact_equations(seen.assembly, seen.start, seen.poses)
+    system = build_contact_equations(seen.assembly, seen.start, seen.poses)
     free = tuple(adapting)
     if not free:
         return float(np.abs(system.residual(goals)).max())
@@ -122,7 +122,7 @@ def test_the_posterior_of_parts_is_that_of_draws() -> None:
     for _ in range(150):
         xi = 1e-6 * rng.standard_normal((len(seen.poses), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
         made = contact(replace(seen, poses=seen.poses @ pose.exp(xi)))
-        at = placements(seen.assembly, seen.start, made.poses)[-1]
+        at = compute_placements(seen.assembly, seen.start, made.poses)[-1]
         drawn.append([pose.log(pose.inverse(part.pose) @ at[part.part]) for part in found.parts])
     spread = np.sqrt(np.mean(np.square(drawn), axis=0))
     stated = np.array([part.deviations for part in found.parts])

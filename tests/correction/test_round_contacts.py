@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from apo_bench import InputError, correct, correct_many, explain
-from apo_bench.assembly import Gap, contact_equations, largest_gap, project_round_faces
+from apo_bench.assembly import Gap, build_contact_equations, measure_largest_gap, project_round_faces
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance
@@ -34,17 +34,17 @@ def case(kind, seed=0, **settings):
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_fixes_what_a_table_says(kind):
     observation, truth = case(kind)
-    assert largest_gap(observation.assembly, observation.start, truth) < 1e-12
+    assert measure_largest_gap(observation.assembly, observation.start, truth) < 1e-12
     found = explain(observation, truth).operations[1]
     assert (found.rank, found.fixed) == (CONTACTS[kind][2], BY_HAND[kind])
-    _, J = contact_equations(observation.assembly, observation.start, truth).linearise(truth)
+    _, J = build_contact_equations(observation.assembly, observation.start, truth).linearise(truth)
     assert np.linalg.matrix_rank(J[:, 6:] / np.repeat([1.0, 0.04], 3), tol=1e-6) == CONTACTS[kind][2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_jacobian_is_that_of_finite_differences(kind):
     observation, _ = case(kind)
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     _, J = system.linearise(observation.poses)
     step = 1e-6
     for column in range(12):
@@ -116,7 +116,7 @@ def test_correctors_close_round_contacts(kind, method):
     observation, _ = case(kind, seed=4)
     made = correct(observation, method)
     assert made.ok, made.sentence
-    assert largest_gap(observation.assembly, observation.start, made.poses) <= observation.gap_m
+    assert measure_largest_gap(observation.assembly, observation.start, made.poses) <= observation.gap_m
 
 
 def test_a_missing_view_is_inferred_from_a_round_contact():
@@ -147,7 +147,7 @@ def test_a_wrong_relation_is_named_as_it_was_given():
     assert {c for suspect in made.test.suspects for c in suspect.contacts} == {
         bore, top, touching("plate.bottom", "table.top"),
     }  # fmt: skip
-    assert largest_gap(project_round_faces(observation.assembly), start, made.poses) > 1e-3
+    assert measure_largest_gap(project_round_faces(observation.assembly), start, made.poses) > 1e-3
 
 
 @pytest.mark.parametrize(("radius", "fit", "play"), [(5.0, True, 0.25), (5.1, False, 0.1), (5.1, True, 0.35)])

@@ -13,7 +13,7 @@ import pytest
 from apo_bench import InputError, observe
 from apo_bench.cli.app import main
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.wrong_contacts import with_contacts
+from apo_bench.perception.observation.wrong_contacts import replace_contacts
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -124,7 +124,7 @@ def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
     with pytest.raises(InputError) as by_noise:
         observe(scenes.shown(TOWER), make_noise(_raising(error), NOISE_LEVEL), rng)
     with pytest.raises(InputError) as by_relations:
-        with_contacts(seen, _raising(error), TOWER.goals, rng)
+        replace_contacts(seen, _raising(error), TOWER.goals, rng)
     for raised in (by_noise, by_relations):
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)

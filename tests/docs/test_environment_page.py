@@ -34,7 +34,7 @@ def test_every_argument_stands_in_its_table_with_its_default() -> None:
 
 
 def test_every_key_of_observation_and_info_stands_in_its_table() -> None:
-    env = apo_bench.Corrected(gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld"))
+    env = apo_bench.CorrectPoses(gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld"))
     seen, told = env.reset(seed=0)
     *_, ended = env.step(np.zeros(env.action_space.shape))
     named = {key for line in lines_of("Info") for key in re.findall(r"`(\w+)`", line.split("|")[2])}

@@ -14,7 +14,7 @@ from tests.browser import browser, opened, overflow
 ROOT = Path(__file__).parents[2]
 PAGES = (
     *("index", "guide/environment", "guide/from-cad", "how/judge", "how/contact", "how/paper"),
-    *("results/headline", "results/arms", "reference/files", "reference/settings"),
+    *("results/headline", "results/arms", "reference/files", "reference/settings", "api/running", "api/environments"),
 )
 CUT = """() => [...document.querySelectorAll('pre > code, .md-typeset__scrollwrap, .formula')]
     .filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0).map(e => e.innerText.slice(0, 80))"""

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 
 from apo_bench.assembly import Outcome
 from apo_bench.envs.apo_insert import APOInsert
-from apo_bench.envs.episode_start import Trials
+from apo_bench.envs.episode_start import TrialStarts
 from apo_bench.errors import InputError
 from apo_bench.records import FIRST_TRAINING_TRIAL
 
@@ -225,9 +225,9 @@ def test_an_episode_may_have_settings_of_its_own(env: APOInsert) -> None:
 def test_starts_for_evaluation_are_as_many_as_seeds_and_none_is_for_training(monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated = gymnasium.make("APOInsert-v0", scenario="block_on_block", starts="evaluation").unwrapped
     assert isinstance(evaluated, APOInsert)
-    begin = Trials.begin
+    begin = TrialStarts.begin
     failed = Outcome("replay", "lost", None, "it fell")
-    monkeypatch.setattr(Trials, "begin", lambda self, t: failed if t in (2, 100_002) else begin(self, t))
+    monkeypatch.setattr(TrialStarts, "begin", lambda self, t: failed if t in (2, 100_002) else begin(self, t))
     trials = []
     for seed in (0, 1, 2, 3):
         evaluated.reset(seed=seed)
@@ -237,6 +237,6 @@ def test_starts_for_evaluation_are_as_many_as_seeds_and_none_is_for_training(mon
     assert evaluated.trial < FIRST_TRAINING_TRIAL
     evaluated.reset(options={"trial": 1_000_001})
     assert evaluated.trial == 1_000_001
-    monkeypatch.setattr(Trials, "begin", lambda self, trial: failed)
+    monkeypatch.setattr(TrialStarts, "begin", lambda self, trial: failed)
     with pytest.raises(InputError, match="trial 5 fails before this operation: it fell"):
         evaluated.reset(seed=5)

@@ -117,7 +117,7 @@ def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
     """Zeros, corrected, are method `paper` of `apo-bench run --seed`."""
     row = run_trial(TrialConfig("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
     assert row["success"] is True
-    _check_episode(apo_bench.Corrected(small, "paper"), row)
+    _check_episode(apo_bench.CorrectPoses(small, "paper"), row)
     reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in small._rendering.poses.items()}
     assert reached == row["reached"]
 
@@ -168,7 +168,7 @@ def _nothing() -> Any:
 def test_correction_aims_and_an_action_composes_on_top(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
     monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
-    corrected = apo_bench.Corrected(watched, "apo_bench.correction.baselines.paper:paper")
+    corrected = apo_bench.CorrectPoses(watched, "apo_bench.correction.baselines.paper:paper")
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "converged"
     assert not np.array_equal(seen["poses"], pose.pack(watched.observation.poses))
@@ -195,7 +195,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
     again: list[Observation] = []
     made = APOReplay("block_on_block", grasp="weld", noise="outliers", max_reobservations=2)
     monkeypatch.setattr(episode, "simulate_demonstration", demonstrated)
-    corrected = apo_bench.Corrected(made, Asks())
+    corrected = apo_bench.CorrectPoses(made, Asks())
     corrected.reset(seed=SEED)
     assert again[0].observed.tolist() == [False, bool(again[0].observed[1])]
     assert not np.array_equal(again[0].poses[1], made.observation.poses[1])
@@ -214,7 +214,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
 
 def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(REPLAY, lambda *_: pytest.fail("nothing may be replayed"))
-    corrected = apo_bench.Corrected(watched, gives_up)
+    corrected = apo_bench.CorrectPoses(watched, gives_up)
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "inconsistent"
     np.testing.assert_array_equal(seen["poses"], pose.pack(watched.observation.poses))
@@ -237,7 +237,7 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
 ) -> None:
     asked: list[Any] = []
     monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
-    corrected = apo_bench.Corrected(watched, rebuilds)
+    corrected = apo_bench.CorrectPoses(watched, rebuilds)
     corrected.reset(seed=SEED)
     made = rebuilds(watched.observation)
     twist = np.linspace(-0.02, 0.02, 18).reshape(3, 6)
@@ -291,7 +291,7 @@ def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.Monk
     watched.reset(seed=SEED)
     again = (Step(0), Step(0, undo=True)) * 600
     watched.aim(watched.observation.poses, (*again, *(Step(k) for k in range(3))))
-    monkeypatch.setattr(replays, "moves", _nothing)
+    monkeypatch.setattr(replays, "plan_moves", _nothing)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()
@@ -325,11 +325,11 @@ def test_an_action_outside_the_space_is_refused(watched: APOReplay, action: Any)
 
 
 def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from apo_bench.perception.observation.models.isotropic import Isotropic
+    from apo_bench.perception.observation.models.isotropic import IsotropicNoise
     from apo_bench.perception.observation.noise import NoiseLevel
 
     def blind(assembly: Any, shown: Any, rng: Any) -> Observation:
-        full = Isotropic(NoiseLevel(1.0, 1.0))(assembly, shown, rng)
+        full = IsotropicNoise(NoiseLevel(1.0, 1.0))(assembly, shown, rng)
         return Observation(assembly, full.start, full.poses, full.covariance, np.array([True, False]))
 
     env = APOReplay("block_on_block", noise=blind)
@@ -338,7 +338,7 @@ def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.Monk
     _, reward, _, _, info = env.step(zeros(env))
     assert (reward, info["stage"], info["code"], info["operation"]) == (0.0, "observe", "not_seen", 2)
     for corrector, ended in (("contact", ("correct", "not_seen")), ("contact-robust", ("done", "ok"))):
-        corrected = apo_bench.Corrected(env, corrector)
+        corrected = apo_bench.CorrectPoses(env, corrector)
         corrected.reset(seed=SEED)
         _, _, _, _, info = corrected.step(zeros(env))
         assert (info["stage"], info["code"]) == ended
@@ -417,9 +417,9 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> N
 
 def test_corrected_wraps_only_this_environment(env: APOReplay) -> None:
     with pytest.raises(InputError, match="did you mean 'paper'"):
-        apo_bench.Corrected(env, "papr")
+        apo_bench.CorrectPoses(env, "papr")
     with pytest.raises(InputError, match="wraps an APOReplay"):
-        apo_bench.Corrected(gymnasium.make("CartPole-v1"))
+        apo_bench.CorrectPoses(gymnasium.make("CartPole-v1"))
 
 
 def test_make_takes_every_argument_and_a_copy_travels() -> None:

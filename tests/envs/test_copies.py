@@ -52,7 +52,7 @@ def test_a_copy_goes_on_as_the_original_would(way: str, noise_level: float) -> N
     made = gymnasium.make(
         "APOReplay-v0", scenario=SMALL, noise_level=noise_level, grasp="weld", render_mode="rgb_array"
     )
-    env = apo_bench.Corrected(made, "paper")
+    env = apo_bench.CorrectPoses(made, "paper")
     fresh = WAYS[way](env)
     begun = env.reset(seed=SEED)
     assert same(fresh.reset(seed=SEED), begun)

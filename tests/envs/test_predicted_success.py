@@ -9,7 +9,7 @@ import pytest
 from apo_bench import TrialConfig, run_trial
 from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.corrected import Corrected
+from apo_bench.envs.corrected import CorrectPoses
 from apo_bench.errors import InputError
 
 SCENARIO = "block_on_block"
@@ -21,7 +21,7 @@ def zeros(env: gymnasium.Env) -> np.ndarray:
 
 
 def test_an_episode_promises_what_its_trial_promises() -> None:
-    env = Corrected(APOReplay(SCENARIO, robot_error="tool:0.2"))
+    env = CorrectPoses(APOReplay(SCENARIO, robot_error="tool:0.2"))
     env.reset(seed=SEED)
     *_, info = env.step(zeros(env))
     row = run_trial(TrialConfig(SCENARIO, seed=SEED, robot_error="tool:0.2"))
@@ -30,7 +30,7 @@ def test_an_episode_promises_what_its_trial_promises() -> None:
 
 def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
-    env = Corrected(APOReplay(SCENARIO, min_predicted_success=1.0))
+    env = CorrectPoses(APOReplay(SCENARIO, min_predicted_success=1.0))
     env.reset(seed=SEED)
     _, reward, terminated, _, info = env.step(zeros(env))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "promise", "abstained")

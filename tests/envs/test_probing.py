@@ -8,7 +8,7 @@ import pytest
 from apo_bench import TrialConfig
 from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.corrected import Corrected
+from apo_bench.envs.corrected import CorrectPoses
 from apo_bench.errors import InputError
 from apo_bench.trial import run
 
@@ -25,7 +25,7 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
     for where in (robot, run):
         monkeypatch.setattr(where, "replay_and_judge", noted)
     settings = {"robot_error": "hand_eye:0.5/0.1", "ft_sensor": "0.5", "assumed_robot_error": "hand_eye:1/0.2+tool:0.3"}
-    env = Corrected(APOReplay(SCENARIO, probe=True, **settings))
+    env = CorrectPoses(APOReplay(SCENARIO, probe=True, **settings))
     env.reset(seed=4)
     with pytest.raises(InterruptedError):
         env.step(np.zeros(env.action_space.shape))

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError, Observation, Plan, load_scenario
-from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, first_order
+from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, correlate_first_order
 from apo_bench.formats.observation import read_stated
 from apo_bench.formats.observation_json import observation_form, read_json_observation
 from apo_bench.formats.plan_json import plan_form
@@ -50,7 +50,7 @@ def with_shared(seen: Observation) -> Observation:
     C = np.diag(np.repeat([1e-4, 2e-3], 3) ** 2)
     P = pose.at((0.1, 0.2, 0.9), (150.0, 20.0, -35.0))
     camera = SharedError("camera", (0, 2), C, P)
-    drift = SharedError("drift", (1, 2), C, P, local=True, correlation=first_order(2, 0.9))
+    drift = SharedError("drift", (1, 2), C, P, local=True, correlation=correlate_first_order(2, 0.9))
     four = np.array([1e-3, 4e-3, 0.02, 0.03])
     tails = Tails(seen.poses[:, :3, :3], four, np.array([2.0, 3.0, 1e9, 5.0]), 2.0 * four**2, np.array([0.05, 0.5]))
     return replace(seen, shared=(camera, drift, SharedError("castle1", (0,), C)), tails=tails)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.geometry import Array, Posed
+from apo_bench.geometry import Array, PosedPieces
 from apo_bench.geometry.solid import all_boxes
 from apo_bench.geometry.swept import _ANYWHERE, _SLACK_M, _box_spans, _exactly
 
 
 def overlap_intervals(
-    moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M, within: tuple[float, float] = _ANYWHERE
+    moving: PosedPieces,
+    way: Array,
+    resting: PosedPieces,
+    slack_m: float = _SLACK_M,
+    within: tuple[float, float] = _ANYWHERE,
 ) -> Array:
     """Where along a line the pieces of two parts overlap by more than a slack, (k, 2), [m]: from and until.
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Face, Hull, Solid, physical_pieces
+from apo_bench.geometry import Face, Hull, Solid, shrink_pieces
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.faces import SIDES, unite
 
 
 def sizes(name: str, clearance_m: float) -> dict[str, tuple[float, ...]]:
-    return {box.name: tuple(2e3 * box.half) for box in physical_pieces(load_part(name), clearance_m)}
+    return {box.name: tuple(2e3 * box.half) for box in shrink_pieces(load_part(name), clearance_m)}
 
 
 def test_the_stick_gets_thinner_and_not_shorter():
@@ -27,7 +27,7 @@ def test_a_pocket_is_wider_and_has_no_crack(clearance_mm: float):
     """The union of the physical boxes is again one solid with two plain pockets, as deep as before."""
     c = 1e-3 * clearance_mm
     solid = load_part("table_pockets")
-    boxes = physical_pieces(solid, c)
+    boxes = shrink_pieces(solid, c)
     assert [box.name for box in boxes] == [box.name for box in solid.pieces]
     union = unite(boxes)
     wide = 0.05 + 2 * c
@@ -50,7 +50,7 @@ def test_a_side_with_a_fit_face_and_another_cannot_recede():
         for name, x, fit in (("left", -0.11, True), ("right", 0.0, False))
     }
     with pytest.raises(InputError, match="'left' and the face 'right'"):
-        physical_pieces(Solid("odd", halves, (bar,), np.zeros(3), bar.half.prod() * 8), 1e-4)
+        shrink_pieces(Solid("odd", halves, (bar,), np.zeros(3), bar.half.prod() * 8), 1e-4)
 
 
 def layered(thin_m: float) -> Solid:
@@ -67,8 +67,8 @@ def layered(thin_m: float) -> Solid:
 
 
 def test_a_piece_that_is_hardly_any_of_a_part_recedes_to_nothing():
-    (left,) = physical_pieces(layered(1.5e-4), 2.5e-4)
+    (left,) = shrink_pieces(layered(1.5e-4), 2.5e-4)
     assert left.name == "thick"
-    assert [piece.name for piece in physical_pieces(layered(1.5e-4), 2e-5)] == ["thick", "thin"]
+    assert [piece.name for piece in shrink_pieces(layered(1.5e-4), 2e-5)] == ["thick", "thin"]
     with pytest.raises(InputError, match=r"leaves less than 0\.1 mm of piece 'thin' of part 'cube'"):
-        physical_pieces(layered(2.5e-4), 2.5e-4)
+        shrink_pieces(layered(2.5e-4), 2.5e-4)

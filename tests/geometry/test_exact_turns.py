@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
+from apo_bench.geometry import (
+    Box,
+    Face,
+    Hull,
+    Solid,
+    find_nearest_alike,
+    find_revolution,
+    find_symmetries,
+    make_turn,
+    pose,
+)
 from tests.round_contacts import MM, part, pin, plate, ring, tube, wall
 
 
@@ -48,7 +58,7 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
     rng = np.random.default_rng(len(corners))
     for at in (np.eye(4), pose.exp(rng.standard_normal(6) * [0.02, 0.02, 0.02, 1, 1, 1])):
         solid = prism(corners - corners.mean(axis=0), height, at)
-        found = symmetries(solid)
+        found = find_symmetries(solid)
         assert len(found) == order
         spots = solid.pieces[0].corners
         for g in found:
@@ -58,28 +68,28 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
 
 @pytest.mark.parametrize("sides", [None, 16])
 def test_a_bush_is_the_same_after_any_turn_and_upside_down(sides):
-    found = revolution(bush(sides=sides))
+    found = find_revolution(bush(sides=sides))
     assert found is not None
     assert abs(found.axis[2]) == pytest.approx(1.0)
-    assert len(symmetries(bush(sides=sides))) == 2
-    assert revolution(pin()) is not None
-    assert len(symmetries(pin())) == 1
-    assert revolution(plate()) is None
-    assert len(symmetries(plate())) == 4
+    assert len(find_symmetries(bush(sides=sides))) == 2
+    assert find_revolution(pin()) is not None
+    assert len(find_symmetries(pin())) == 1
+    assert find_revolution(plate()) is None
+    assert len(find_symmetries(plate())) == 4
 
 
 def test_what_is_not_round_is_no_part_of_revolution():
     """A flat that is stated, a block that no face states, a bore that is off the axis, an inertia that is not even."""
     flat = Face("flat", np.array([[9, -4, 0], [9, 4, 0], [9, 4, 20], [9, -4, 20]]) * MM)
-    assert revolution(bush(flat)) is None
+    assert find_revolution(bush(flat)) is None
     key = Box("key", np.array([12, 0, 10]) * MM, np.array([3, 2, 10]) * MM)
-    assert revolution(replace(bush(), pieces=(*bush().pieces, key))) is None
+    assert find_revolution(replace(bush(), pieces=(*bush().pieces, key))) is None
     away = replace(bush().rounds["bore"], point=np.array([1 * MM, 0, 0]))
-    assert revolution(replace(bush(), rounds={**bush().rounds, "bore": away})) is None
-    assert revolution(replace(bush(), inertia=np.diag([1.0, 1.2, 2.0]))) is None
-    assert revolution(replace(bush(), inertia=np.diag([1.0, 1.0, 2.0]))) is not None
+    assert find_revolution(replace(bush(), rounds={**bush().rounds, "bore": away})) is None
+    assert find_revolution(replace(bush(), inertia=np.diag([1.0, 1.2, 2.0]))) is None
+    assert find_revolution(replace(bush(), inertia=np.diag([1.0, 1.0, 2.0]))) is not None
     square = prism(regular(4), 20 * MM).pieces
-    assert revolution(replace(bush(), pieces=square, centroid=np.zeros(3), faces={})) is None
+    assert find_revolution(replace(bush(), pieces=square, centroid=np.zeros(3), faces={})) is None
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -89,10 +99,12 @@ def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
     T = np.eye(4)
     expected = np.eye(4)
     T[:3, :3], expected[:3, :3] = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
-    axis = revolution(solid)
-    found = nearest_alike(solid, T, expected)
+    axis = find_revolution(solid)
+    found = find_nearest_alike(solid, T, expected)
     every = [
-        T @ g @ turn_about(axis.point, axis.axis, t) for g in symmetries(solid) for t in np.linspace(-np.pi, np.pi, 721)
+        T @ g @ make_turn(axis.point, axis.axis, t)
+        for g in find_symmetries(solid)
+        for t in np.linspace(-np.pi, np.pi, 721)
     ]
     best = max(np.trace(expected[:3, :3].T @ one[:3, :3]) for one in every)
     assert np.trace(expected[:3, :3].T @ found[:3, :3]) >= best - 1e-9

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from apo_bench.geometry import PAD_M, Box, Solid, held_span, intrusion_depths, is_held
-from apo_bench.geometry.pads import holds
-from apo_bench.scenario.parts.making import Frustum, extrude, polygon, revolve, shaft, solid_of
+from apo_bench.geometry import PAD_M, Box, Solid, is_held, measure_held_span, measure_intrusion_depths
+from apo_bench.geometry.pads import find_holds
+from apo_bench.scenario.parts.making import Frustum, build_solid, extrude, make_polygon, make_shaft, revolve
 
 OPENING_M = 0.046
-L = extrude(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)
-U = extrude(polygon((0, 0), (80, 0), (80, 40), (68, 40), (68, 10), (12, 10), (12, 40), (0, 40)), 0, 30)
+L = extrude(make_polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)
+U = extrude(make_polygon((0, 0), (80, 0), (80, 40), (68, 40), (68, 10), (12, 10), (12, 40), (0, 40)), 0, 30)
 BUSH = revolve(
     [Frustum(0, 3, 9, name="flange"), Frustum(3, 20, 7, name="outer")], [Frustum(0, 20, 5, name="inner", fit=True)]
 )
 PARTS = {
-    "peg": (shaft(5, -25, 25, "wall"), (0, 0, 1)),
-    "lying peg": (shaft(5, -25, 25, "wall"), (1, 0, 0)),
+    "peg": (make_shaft(5, -25, 25, "wall"), (0, 0, 1)),
+    "lying peg": (make_shaft(5, -25, 25, "wall"), (1, 0, 0)),
     "bush": (BUSH, (0, 0, 1)),
     "standing L": (L, (0, 1, 0)),
     "standing U": (U, (0, 1, 0)),
@@ -28,7 +28,7 @@ PARTS = {
 
 def made(name: str) -> tuple[Solid, np.ndarray]:
     body, up = PARTS[name]
-    return solid_of("part", body), np.array(up, dtype=np.float64)
+    return build_solid("part", body), np.array(up, dtype=np.float64)
 
 
 def fingers(
@@ -47,16 +47,16 @@ def fingers(
 @pytest.mark.parametrize("name", PARTS)
 def test_pads_touch_both_sides_and_open_fingers_strike_nothing(name: str):
     solid, up = made(name)
-    found = holds(solid, up, OPENING_M)
+    found = find_holds(solid, up, OPENING_M)
     assert found
     for hold in found[:: max(1, len(found) // 20)]:
-        span = held_span(solid.pieces, hold.point, hold.across, up)
+        span = measure_held_span(solid.pieces, hold.point, hold.across, up)
         assert span is not None
         assert span == pytest.approx((-hold.half_width, hold.half_width), abs=1e-4)  # rays pass beside a round crest
         assert abs(hold.across @ up) < 1e-9
         boxes, T = fingers(up, hold.across, hold.point, min(hold.half_width + 0.012, OPENING_M))
         own = np.linalg.inv(T)
-        depth = intrusion_depths(solid.pieces, own[:3, :3], own[None, :3, 3], tuple(boxes), np.eye(4))
+        depth = measure_intrusion_depths(solid.pieces, own[:3, :3], own[None, :3, 3], tuple(boxes), np.eye(4))
         assert depth[0] <= 1e-6
 
 
@@ -64,16 +64,16 @@ def test_pads_touch_both_sides_and_open_fingers_strike_nothing(name: str):
 def test_what_is_offered_is_held_and_the_air_beside_it_is_not(name: str):
     solid, up = made(name)
     for over in (0.0, 0.0085):
-        found = holds(solid, up, OPENING_M, over)
+        found = find_holds(solid, up, OPENING_M, over)
         for hold in found[:: 1 + len(found) // 20]:
             assert is_held(solid, hold.point, hold.across, up, OPENING_M)
-    hold = holds(solid, up, OPENING_M)[0]
+    hold = find_holds(solid, up, OPENING_M)[0]
     assert not is_held(solid, hold.point + 0.2 * hold.across, hold.across, up, OPENING_M)
 
 
 def test_a_pinch_holds_the_uppermost_millimetres_and_leaves_what_is_below_free():
-    pin = solid_of("pin", shaft(3.5, 0, 11.5, "wall"))
+    pin = build_solid("pin", make_shaft(3.5, 0, 11.5, "wall"))
     up = np.array([0.0, 0.0, 1.0])
-    reach = [max(hold.point[2] for hold in holds(pin, up, OPENING_M, over)) - PAD_M[1] for over in (0.0, 0.0085)]
+    reach = [max(hold.point[2] for hold in find_holds(pin, up, OPENING_M, over)) - PAD_M[1] for over in (0.0, 0.0085)]
     assert reach[0] < 0.003
     assert 0.0085 < reach[1] <= 0.0101

@@ -13,15 +13,15 @@ from apo_bench.geometry import (
     Box,
     Cylinder,
     Hull,
-    Posed,
+    PosedPieces,
     RoundFace,
     Solid,
-    cylinder_hull,
-    extent,
-    intrusion_depths,
-    physical_pieces,
-    separating_axes,
-    sides_of,
+    count_sides,
+    find_separating_axes,
+    make_cylinder_hull,
+    measure_extent,
+    measure_intrusion_depths,
+    shrink_pieces,
 )
 from tests.geometry.overlaps import overlap_intervals
 
@@ -47,23 +47,23 @@ def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
     a, b = (Box(name, rng.uniform(-0.02, 0.02, 3), rng.uniform(0.005, 0.03, 3)) for name in "ab")
     T_a = posed(rng)
     T_b = posed(rng)
-    wanted = intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
-    found = intrusion_depths((as_hull(a),), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
+    wanted = measure_intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
+    found = measure_intrusion_depths((as_hull(a),), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
     if wanted[0] > 0.0:
         assert found == pytest.approx(wanted, abs=1e-12)
     assert (found > 0.0) == (wanted > 0.0)
     way = rng.standard_normal(3)
     way /= np.linalg.norm(way)
-    spans = overlap_intervals(Posed((a,), T_a), way, Posed((b,), T_b))
-    same = overlap_intervals(Posed((as_hull(a),), T_a), way, Posed((as_hull(b),), T_b))
+    spans = overlap_intervals(PosedPieces((a,), T_a), way, PosedPieces((b,), T_b))
+    same = overlap_intervals(PosedPieces((as_hull(a),), T_a), way, PosedPieces((as_hull(b),), T_b))
     assert same == pytest.approx(spans, abs=1e-9)
 
 
 def test_a_cylinder_is_as_wide_as_its_sagitta_allows():
-    hull = cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.02))
-    assert len(hull.corners) == 2 * sides_of(0.005)
+    hull = make_cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.02))
+    assert len(hull.corners) == 2 * count_sides(0.005)
     for angle in np.linspace(0.0, 6.0, 50):
-        low, high = extent((hull,), np.array([np.cos(angle), np.sin(angle), 0.0]))
+        low, high = measure_extent((hull,), np.array([np.cos(angle), np.sin(angle), 0.0]))
         assert 0.005 - SAGITTA_M <= high <= 0.005 + 1e-12
         assert -0.005 - 1e-12 <= low <= -0.005 + SAGITTA_M
 
@@ -87,13 +87,13 @@ def bore(radius: float, fit: bool) -> RoundFace:
 def test_a_hole_that_fits_gets_wider_by_the_clearance():
     clearance_mm = 0.25
     plate = solid(*wedges(0.005, 70), bore=bore(0.005, fit=True))
-    made = physical_pieces(plate, 1e-3 * clearance_mm)
+    made = shrink_pieces(plate, 1e-3 * clearance_mm)
     inner = [np.linalg.norm(p.corners[:, :2], axis=1).min() * np.cos(np.pi / 70) for p in made]
     assert inner == pytest.approx(np.full(70, 0.005 + 1e-3 * clearance_mm), abs=1e-9)
     outer = [np.linalg.norm(p.corners[:, :2], axis=1).max() for p in made]
     assert outer == pytest.approx(np.full(70, 0.02), abs=1e-9)
     plain = solid(*wedges(0.005, 70), bore=bore(0.005, fit=False))
-    assert physical_pieces(plain, 1e-3 * clearance_mm) is plain.pieces
+    assert shrink_pieces(plain, 1e-3 * clearance_mm) is plain.pieces
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -107,11 +107,11 @@ def test_pairs_that_are_not_looked_at_change_no_depth(seed: int):
     T_a = posed(rng, 0.02)
     T_b = posed(rng, 0.02)
     at = T_a[:3, 3] + rng.uniform(-0.05, 0.05, (5, 3))
-    found = intrusion_depths(a, T_a[:3, :3], at, b, T_b)
+    found = measure_intrusion_depths(a, T_a[:3, :3], at, b, T_b)
     for place, depth in zip(at, found, strict=True):
         every = []
         for p, q in product(a, b):
-            axes = separating_axes(p, T_a[:3, :3], q, T_b[:3, :3])
+            axes = find_separating_axes(p, T_a[:3, :3], q, T_b[:3, :3])
             low_p = (p.corners @ T_a[:3, :3].T + place) @ axes.T
             low_q = (q.corners @ T_b[:3, :3].T + T_b[:3, 3]) @ axes.T
             outs = np.minimum(low_p.max(0) - low_q.min(0), low_q.max(0) - low_p.min(0))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Array, Box, Solid, pose
-from apo_bench.geometry.penetration import intrusion
+from apo_bench.geometry.penetration import measure_intrusion
 
 coordinates = st.floats(-0.1, 0.1)
 turns = st.floats(-180, 180)
@@ -24,6 +24,6 @@ def block(*half: float) -> Solid:
 def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array):
     a = block(0.03, 0.02, 0.01)
     b = block(0.05, 0.01, 0.04)
-    depth = intrusion(a, np.eye(4), b, T)
-    assert intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
-    assert intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)
+    depth = measure_intrusion(a, np.eye(4), b, T)
+    assert measure_intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
+    assert measure_intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Face, RoundFace, pose, shares
-from apo_bench.geometry.mating import mate
+from apo_bench.geometry import Face, RoundFace, compute_shares, pose
+from apo_bench.geometry.mating import measure_mate
 from tests.rounds import cone, cylinder, rim, square, up
 from tests.scenes import mm
 
@@ -31,7 +31,7 @@ HERE = np.eye(4)
     ],
 )
 def test_a_shaft_in_a_hole(T: np.ndarray, gap_mm: float, angle_deg: float, length_mm: float) -> None:
-    found = mate(PEG, T, BORE, HERE)
+    found = measure_mate(PEG, T, BORE, HERE)
     assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
     assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
     assert 1e3 * found.length_m == pytest.approx(length_mm, abs=1e-9)
@@ -39,7 +39,7 @@ def test_a_shaft_in_a_hole(T: np.ndarray, gap_mm: float, angle_deg: float, lengt
 
 
 def test_the_offset_at_each_end_is_a_vector_from_the_axis_of_the_hole() -> None:
-    found = mate(PEG, mm(0.3, 0, 10, (0, 1, 0)), BORE, HERE)
+    found = measure_mate(PEG, mm(0.3, 0, 10, (0, 1, 0)), BORE, HERE)
     assert found.points[:, 2] == pytest.approx([0.0, 0.02])
     lean = 10 * np.tan(np.radians(1))
     assert 1e3 * found.off == pytest.approx(np.array([[0.3 - lean, 0, 0], [0.3 + lean, 0, 0]]), abs=1e-9)
@@ -55,7 +55,7 @@ def test_the_offset_at_each_end_is_a_vector_from_the_axis_of_the_hole() -> None:
     ],
 )
 def test_a_shaft_on_a_plane(T: np.ndarray, heights_mm: tuple[float, float], angle_deg: float, length_mm: float) -> None:
-    for found in (mate(PEG, T, TABLE, HERE), mate(TABLE, HERE, PEG, T)):
+    for found in (measure_mate(PEG, T, TABLE, HERE), measure_mate(TABLE, HERE, PEG, T)):
         assert 1e3 * found.off[:, 2] == pytest.approx(heights_mm, abs=1e-9)
         assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
         assert 1e3 * found.length_m == pytest.approx(length_mm, abs=1e-9)
@@ -73,8 +73,8 @@ def test_a_shaft_on_a_plane(T: np.ndarray, heights_mm: tuple[float, float], angl
 )
 def test_a_cone_in_a_countersink(T: np.ndarray, gap_mm: float, angle_deg: float) -> None:
     if angle_deg == 0:
-        assert mate(CONE, T, SINK, HERE).rise_m == pytest.approx(T[2, 3] + 6e-3, abs=1e-9)
-    for found in (mate(CONE, T, SINK, HERE), mate(SINK, HERE, CONE, T)):
+        assert measure_mate(CONE, T, SINK, HERE).rise_m == pytest.approx(T[2, 3] + 6e-3, abs=1e-9)
+    for found in (measure_mate(CONE, T, SINK, HERE), measure_mate(SINK, HERE, CONE, T)):
         assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
         assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
 
@@ -82,13 +82,13 @@ def test_a_cone_in_a_countersink(T: np.ndarray, gap_mm: float, angle_deg: float)
 @pytest.mark.parametrize(("x", "z", "gap_mm"), [(0, -2, 0), (0, -1.8, 0.2 * np.sqrt(0.5)), (0.3, -2, 0.3)])
 def test_a_cone_on_the_rim_of_a_hole_and_the_rim_of_a_shaft_in_a_countersink(x: float, z: float, gap_mm: float) -> None:
     """Rims of 5 mm where the cones are 3 to 9 mm wide: 2 mm above the narrow end."""
-    for found in (mate(CONE, mm(x, 0, z), RIM, HERE), mate(RIM, HERE, CONE, mm(x, 0, z))):
+    for found in (measure_mate(CONE, mm(x, 0, z), RIM, HERE), measure_mate(RIM, HERE, CONE, mm(x, 0, z))):
         assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
         assert found.common
-    for found in (mate(EDGE, mm(x, 0, z - 2), SINK, HERE), mate(SINK, HERE, EDGE, mm(x, 0, z - 2))):
+    for found in (measure_mate(EDGE, mm(x, 0, z - 2), SINK, HERE), measure_mate(SINK, HERE, EDGE, mm(x, 0, z - 2))):
         assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
         assert found.common
-    assert np.degrees(mate(CONE, mm(0, 0, 0, (180, 0, 0)), RIM, HERE).angle_rad) == pytest.approx(180)
+    assert np.degrees(measure_mate(CONE, mm(0, 0, 0, (180, 0, 0)), RIM, HERE).angle_rad) == pytest.approx(180)
 
 
 PAIRS: list[tuple[Face | RoundFace, Face | RoundFace, float]] = [
@@ -108,9 +108,9 @@ def test_the_world_does_not_matter(seed: int, pair: tuple[Face | RoundFace, Face
     lying = (0, 90, 0) if b is TABLE else (0, 0, 0)
     T = mm(0, 0, z, lying) @ pose.exp(rng.standard_normal(6) * np.repeat([1e-3, 0.02], 3))
     W = pose.exp(rng.standard_normal(6))
-    here = mate(a, T, b, HERE)
-    there = mate(a, W @ T, b, W)
+    here = measure_mate(a, T, b, HERE)
+    there = measure_mate(a, W @ T, b, W)
     for name in ("gap_m", "angle_rad", "rise_m", "length_m"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-9)
     assert there.off == pytest.approx(here.off @ W[:3, :3].T, abs=1e-9)
-    assert shares([there.common], [here.common]) == pytest.approx([1.0], abs=1e-6)
+    assert compute_shares([there.common], [here.common]) == pytest.approx([1.0], abs=1e-6)

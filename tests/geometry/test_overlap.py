@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Array, Face, face_area, pose
-from apo_bench.geometry.covering import overlap
+from apo_bench.geometry import Array, Face, measure_face_area, pose
+from apo_bench.geometry.covering import compute_overlap
 
 pytestmark = pytest.mark.numeric
 
@@ -49,7 +49,7 @@ flat_poses = st.builds(lambda x, y, a: pose.at((x, y, 0), (0, 0, a)), lengths, l
     ],
 )
 def test_no_overlap(T: Array, why: str):
-    found = overlap(rectangle(0.03, 0.03), T, rectangle(0.03, 0.03), EYE)
+    found = compute_overlap(rectangle(0.03, 0.03), T, rectangle(0.03, 0.03), EYE)
     assert found.area == 0.0, why
     assert found.corners.shape == (0, 3)
     assert not found
@@ -60,8 +60,8 @@ def test_no_overlap(T: Array, why: str):
 def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face: Array, T: Array):
     face = U_SHAPE
     on = ring(0.04, 0.012)
-    before = overlap(face, T_face @ OVER, on, EYE)
-    after = overlap(face, T @ T_face @ OVER, on, T)
+    before = compute_overlap(face, T_face @ OVER, on, EYE)
+    after = compute_overlap(face, T @ T_face @ OVER, on, T)
     assert after.area == pytest.approx(before.area, abs=1e-12)
     if before and len(before.corners) == len(after.corners):
         gaps = np.linalg.norm(pose.apply(T, before.corners)[:, None] - after.corners[None], axis=-1).min(axis=0)
@@ -73,7 +73,9 @@ def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face:
 def test_the_shadow_of_a_tilted_face_shrinks_with_the_cosine(rx: float, ry: float):
     T = pose.at((0, 0, 0.01), (rx, ry, 0))
     cosine = abs(T[2, 2])
-    assert overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(cosine * face_area(U_SHAPE), abs=1e-12)
+    assert compute_overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(
+        cosine * measure_face_area(U_SHAPE), abs=1e-12
+    )
 
 
 @given(flat_poses)
@@ -88,4 +90,4 @@ def test_the_area_is_that_of_counted_points(T_face: Array):
     v = local[:, 1]
     in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
     counted = step**2 * np.count_nonzero(in_ring & in_u)
-    assert overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)
+    assert compute_overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Hull, intrusion_depths
+from apo_bench.geometry import Hull, measure_intrusion_depths
 
 
 def random_hull(rng: np.random.Generator) -> Hull:
@@ -46,7 +46,7 @@ def test_random_pieces_are_as_deep_as_their_difference_says(seed: int):
     T_b = moved(rng, 0.005)
     corners = [hull.corners @ T[:3, :3].T + T[:3, 3] for hull, T in ((a, T_a), (b, T_b))]
     wanted = depth(*corners)
-    found = float(intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)[0])
+    found = float(measure_intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)[0])
     assert max(0.0, found) == pytest.approx(wanted, abs=1e-9)
     if abs(found) > 1e-7:
         assert (found > 0.0) == overlap(*corners)
@@ -58,8 +58,8 @@ def test_what_is_far_apart_may_be_left_out(seed: int):
     a, b = (tuple(random_hull(rng) for _ in range(5)) for _ in range(2))
     at = rng.uniform(-0.1, 0.1, (9, 3))
     T = moved(rng, 0.05)
-    depths = intrusion_depths(a, np.eye(3), at, b, T)
+    depths = measure_intrusion_depths(a, np.eye(3), at, b, T)
     for apart in (0.0, 0.02):
         np.testing.assert_array_equal(
-            intrusion_depths(a, np.eye(3), at, b, T, apart), np.maximum(depths, -apart), strict=True
+            measure_intrusion_depths(a, np.eye(3), at, b, T, apart), np.maximum(depths, -apart), strict=True
         )

@@ -8,14 +8,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Solid, pose, revolution, turn_alike
+from apo_bench.geometry import Solid, find_least_turned, find_revolution, pose
 from tests import rounds
 
 
 def test_a_shaft_with_one_fit_end_is_not_the_same_end_for_end() -> None:
     peg = rounds.peg()
     fit = replace(peg, faces={**peg.faces, "end": replace(peg.faces["end"], fit=True)})
-    found = revolution(fit)
+    found = find_revolution(fit)
     assert found is not None
     assert not found.reversible
 
@@ -25,11 +25,11 @@ def test_a_shaft_with_one_fit_end_is_not_the_same_end_for_end() -> None:
 def test_the_turn_is_the_least_there_is(seed: int, part: Solid) -> None:
     """No other turn about the axis, nor end for end where that is allowed, leaves less between the two poses."""
     rng = np.random.default_rng(seed)
-    found = revolution(part)
+    found = find_revolution(part)
     assert found is not None
     T = pose.exp(rng.standard_normal(6))
     true = pose.exp(rng.standard_normal(6))
-    best = turn_alike(part, T, true)
+    best = find_least_turned(part, T, true)
 
     def turn(X: np.ndarray) -> float:
         return float(np.linalg.norm(pose.log(pose.inverse(true) @ X)[3:]))

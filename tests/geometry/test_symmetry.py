@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.geometry import Array, Box, Solid, folds, pose, quarter_turns, symmetries
+from apo_bench.geometry import Array, Box, Solid, count_folds, find_symmetries, list_quarter_turns, pose
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -47,8 +47,8 @@ def in_the_corner(cells: Array) -> set[tuple[int, ...]]:
 def test_a_turn_is_a_symmetry_exactly_if_it_maps_the_voxels_onto_themselves(boxes) -> None:
     """The oracle turns whole cells and shifts them back; it knows neither centroids nor grids of cuts."""
     cells = 2.0 * np.array(sorted(voxels(boxes))) + 1.0
-    expected = [R for R in quarter_turns() if in_the_corner(cells @ R.T) == in_the_corner(cells)]
-    found = symmetries(solid_of(boxes))
+    expected = [R for R in list_quarter_turns() if in_the_corner(cells @ R.T) == in_the_corner(cells)]
+    found = find_symmetries(solid_of(boxes))
     assert_allclose(found[:, :3, :3], expected)
     middles = cells / 2 * UNIT_M
     for g in found:
@@ -67,7 +67,7 @@ def test_a_turn_is_a_symmetry_exactly_if_it_maps_the_voxels_onto_themselves(boxe
     ],
 )
 def test_known_parts(part: Solid, order: int, fold: tuple[int, ...]) -> None:
-    found = symmetries(part)
+    found = find_symmetries(part)
     assert len(found) == order
-    assert tuple(folds(found)) == fold
+    assert tuple(count_folds(found)) == fold
     assert_allclose(found[0], np.eye(4))

@@ -11,7 +11,7 @@ import pytest
 
 from apo_bench import InputError, load_scenario, read_observation
 from apo_bench.formats.bop import read_results
-from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
+from apo_bench.io import FileTable, NotNegative, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
 from apo_bench.io.safe_io import read_bytes, read_text
 from apo_bench.scenario.parts import load_part
@@ -57,14 +57,14 @@ def test_only_so_much_is_read(tmp_path: Path) -> None:
         read_text(path, "file")
 
 
-class Pose(Table, frozen=True):
+class Pose(FileTable, frozen=True):
     """A table in a table."""
 
     at_mm: Triple
     turn_deg: Triple = (0.0, 0.0, 0.0)
 
 
-class Step(Table, frozen=True, tag="step"):
+class Step(FileTable, frozen=True, tag="step"):
     """One of two kinds."""
 
     move: Text
@@ -72,13 +72,13 @@ class Step(Table, frozen=True, tag="step"):
     kind: Literal["centred", "contact"] = "centred"
 
 
-class Wait(Table, frozen=True, tag="wait"):
+class Wait(FileTable, frozen=True, tag="wait"):
     """The other kind."""
 
     seconds: NotNegative
 
 
-class Plan(Table, frozen=True, kw_only=True):
+class Plan(FileTable, frozen=True, kw_only=True):
     """A whole file."""
 
     schema: Literal[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.geometry import pose, revolution, symmetries
+from apo_bench.geometry import find_revolution, find_symmetries, pose
 from apo_bench.judging.finished import fixtures
 from tests import audited_more_rounds, audited_rounds, audited_wholes, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS
@@ -41,7 +41,7 @@ def test_symmetries_and_the_place_on_the_table_do_not_matter(name: str) -> None:
     scene = scenes.ALL[name]()
     for _ in range(4):
         loose = scene.assembly.solids.keys() - scene.assembly.fixed
-        edits = [turned(part, rng.choice(symmetries(scene.assembly.solids[part]))) for part in sorted(loose)]
+        edits = [turned(part, rng.choice(find_symmetries(scene.assembly.solids[part]))) for part in sorted(loose)]
         if name != "pockets":
             x, y, turn = rng.uniform([-200, -200, -40], [200, 200, 40])
             edits.append(moved(1, scenes.mm(x, y, 0, (0, 0, turn))))
@@ -64,7 +64,7 @@ def test_a_part_of_revolution_is_the_same_after_any_turn_about_its_axis(name: st
     """Turned anyhow when it was put, and again at the end; all of it elsewhere."""
     rng = np.random.default_rng(11)
     scene = rounds.ALL[name]()
-    round_ones = [part for part, solid in scene.assembly.solids.items() if revolution(solid) is not None]
+    round_ones = [part for part, solid in scene.assembly.solids.items() if find_revolution(solid) is not None]
     for _ in range(3):
         edits = [turned(part, pose.at((0, 0, 0), (0, 0, rng.uniform(-180, 180)))) for part in round_ones]
         edits += [shift(part, END, 0, 0, 0, (0, 0, rng.uniform(-180, 180))) for part in round_ones]

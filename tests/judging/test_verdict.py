@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import Criteria, judge
-from apo_bench.assembly import Reached, placements
+from apo_bench.assembly import ReachedState, compute_placements
 from apo_bench.geometry import pose
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS
@@ -189,11 +189,11 @@ def test_each_contact_is_judged_when_made_and_at_the_end_if_it_stands() -> None:
 
 def test_poses_that_are_not_finite_fail_without_a_crash() -> None:
     scene = scenes.turned(TOWER(), LAYOUT)
-    poses = placements(scene.assembly, scene.start, scene.goals)
+    poses = compute_placements(scene.assembly, scene.start, scene.goals)
     good = [snapshot(dict(state)) for state in poses]
     broken = snapshot(dict(poses[-1]))
     object.__setattr__(broken, "poses", {**poses[-1], "stick": np.full((4, 4), np.nan)})
-    for reached in (Reached((*good[:2], broken), broken), Reached(tuple(good), broken)):
+    for reached in (ReachedState((*good[:2], broken), broken), ReachedState(tuple(good), broken)):
         found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM))
         assert (found.success, found.as_demonstrated, found.loose_success) == (False, False, False)
         assert found.finished.code == found.demonstrated.code == "not_made"
@@ -237,9 +237,9 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
     numbers = []
     for W in (np.eye(4), pose.exp(rng.standard_normal(6))):
         there = scenes.turned(scene, W)
-        states = [snapshot(dict(p)) for p in placements(there.assembly, there.start, W @ goals)]
+        states = [snapshot(dict(p)) for p in compute_placements(there.assembly, there.start, W @ goals)]
         both = judge(
-            there.assembly, Reached(tuple(states), states[-1]), there.goals, Criteria(Thresholds(), CLEARANCE_MM)
+            there.assembly, ReachedState(tuple(states), states[-1]), there.goals, Criteria(Thresholds(), CLEARANCE_MM)
         )
         found = (both.demonstrated, both.finished)
         numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.displaced_mm)])
@@ -269,10 +269,10 @@ def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:
 
 def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
     scene = FIXTURE()
-    poses = placements(scene.assembly, scene.start, scene.goals)
+    poses = compute_placements(scene.assembly, scene.start, scene.goals)
     off = [dict(state) for state in poses]
     off[2]["castle2"] = off[2]["castle2"] @ scenes.mm(0, -0.9, 0)
-    reached = Reached(tuple(map(snapshot, off)), snapshot(dict(poses[-1])))
+    reached = ReachedState(tuple(map(snapshot, off)), snapshot(dict(poses[-1])))
     for meaning, right in (("assembled", True), ("as_demonstrated", False)):
         found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM, meaning))
         assert (found.success, found.as_demonstrated) == (right, False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import InputError
-from apo_bench.records import checked_ft_sensor, ft_noise
+from apo_bench.records import normalise_ft_sensor, parse_ft_noise
 
 
 @pytest.mark.parametrize(
@@ -19,11 +19,11 @@ from apo_bench.records import checked_ft_sensor, ft_noise
     ],
 )
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, noise: tuple[float, float]) -> None:
-    assert checked_ft_sensor(given) == spelled == checked_ft_sensor(spelled)
-    assert ft_noise(given) == noise == ft_noise(spelled)
+    assert normalise_ft_sensor(given) == spelled == normalise_ft_sensor(spelled)
+    assert parse_ft_noise(given) == noise == parse_ft_noise(spelled)
 
 
 @pytest.mark.parametrize("given", ["writs", "-1", "0.1/nan", "11"])
 def test_another_sensor_is_refused(given: str) -> None:
     with pytest.raises(InputError, match="force-torque sensor '"):
-        checked_ft_sensor(given)
+        normalise_ft_sensor(given)

@@ -4,7 +4,7 @@ import pytest
 
 from apo_bench import InputError, SweepConfig, TrialConfig, load_scenario
 from apo_bench.assembly import ReobservingCorrector
-from apo_bench.benchmark.analysis import rank
+from apo_bench.benchmark.analysis import rank_method
 from apo_bench.benchmark.sweeps.grid import units
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTORS, knows_truth, may_reobserve, parse_method, probes, uses_contacts
@@ -67,7 +67,7 @@ def test_what_a_method_meets_is_that_of_its_plan():
         "snap",
         "snap+spiral",
     ]
-    assert sorted(ranked, key=lambda m: (rank(m), m)) == ranked
+    assert sorted(ranked, key=lambda m: (rank_method(m), m)) == ranked
 
 
 def test_an_oracle_that_searches_runs_once_per_seed():

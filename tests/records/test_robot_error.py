@@ -5,7 +5,12 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import InputError
-from apo_bench.records import assumed_error, checked_assumed_robot_error, checked_robot_error, robot_sigmas
+from apo_bench.records import (
+    normalise_assumed_robot_error,
+    normalise_robot_error,
+    parse_assumed_error,
+    parse_robot_error,
+)
 from apo_bench.records.robot_error import Sigmas
 
 
@@ -19,13 +24,13 @@ from apo_bench.records.robot_error import Sigmas
     ],
 )
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) -> None:
-    assert checked_robot_error(given) == spelled == checked_robot_error(spelled)
-    assert robot_sigmas(given) == robot_sigmas(spelled)
+    assert normalise_robot_error(given) == spelled == normalise_robot_error(spelled)
+    assert parse_robot_error(given) == parse_robot_error(spelled)
 
 
 def test_numbers_are_those_of_their_kinds() -> None:
     asked = "hand_eye:1/0.2+joints:0.05+tool:0.5+in_hand:0.3/2"
-    assert robot_sigmas(asked) == Sigmas((1.0, 0.2), 0.05, 0.5, (0.3, 2.0))
+    assert parse_robot_error(asked) == Sigmas((1.0, 0.2), 0.05, 0.5, (0.3, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -42,7 +47,7 @@ def test_numbers_are_those_of_their_kinds() -> None:
 )
 def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
-        checked_robot_error(given)
+        normalise_robot_error(given)
     assert str(refused.value).startswith(said)
 
 
@@ -59,11 +64,11 @@ def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
 def test_what_a_robot_is_told_is_what_is_drawn_nothing_or_something_else(
     given: str, spelled: str, told: str | None
 ) -> None:
-    assert checked_assumed_robot_error(given) == spelled == checked_assumed_robot_error(spelled)
-    assert assumed_error(spelled, "tool:0.2") == told
+    assert normalise_assumed_robot_error(given) == spelled == normalise_assumed_robot_error(spelled)
+    assert parse_assumed_error(spelled, "tool:0.2") == told
 
 
 @pytest.mark.parametrize("given", ["matchd", "tool:1+elbow:2"])
 def test_another_assumed_error_is_refused(given: str) -> None:
     with pytest.raises(InputError, match="assumed robot error"):
-        checked_assumed_robot_error(given)
+        normalise_assumed_robot_error(given)

@@ -20,7 +20,7 @@ from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.records import SecretSeed, read_secret_seed, secret_seed_of_sweep
+from apo_bench.records import SecretSeed, open_secret_seed, read_secret_seed
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.secret_seed import make_secret_seed
 from apo_bench.trial.fingerprint import config_hash
@@ -124,20 +124,20 @@ def test_anything_else_is_no_salt_and_is_not_repeated(tmp_path: Path, content: b
 
 def test_a_salt_is_made_once_for_its_owner_alone(tmp_path: Path) -> None:
     path = tmp_path / "secret_seed"
-    made = secret_seed_of_sweep(path, tmp_path / "out")
+    made = open_secret_seed(path, tmp_path / "out")
     assert len(made.secret) == 32
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert os.listdir(tmp_path) == ["secret_seed"]
-    assert secret_seed_of_sweep(path, tmp_path / "out") == made
+    assert open_secret_seed(path, tmp_path / "out") == made
     make_secret_seed(path)
     assert read_secret_seed(path) == made
-    assert secret_seed_of_sweep(tmp_path / "other", tmp_path / "out") != made
+    assert open_secret_seed(tmp_path / "other", tmp_path / "out") != made
 
 
 def test_a_salt_that_is_lost_is_not_made_again(tmp_path: Path) -> None:
     out = write(tmp_path / "out", [row("uncorrected", 1, True)])
     with pytest.raises(InputError, match=r"is not there, and .* holds trials already"):
-        secret_seed_of_sweep(tmp_path / "secret_seed", out)
+        open_secret_seed(tmp_path / "secret_seed", out)
     assert not (tmp_path / "secret_seed").exists()
 
 

@@ -16,7 +16,7 @@ from apo_bench import InputError, SweepConfig, TrialConfig, run_trial
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
-from apo_bench.cli.shared.setting_options import sweep_options, trial_options
+from apo_bench.cli.shared.setting_options import make_sweep_options, make_trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import (
     KEY,
@@ -24,8 +24,8 @@ from apo_bench.records import (
     RECORD_SCHEMA,
     REQUIRED,
     SETTINGS,
-    setting_columns,
-    settings_of,
+    list_setting_columns,
+    restore_settings,
 )
 from apo_bench.records.run.run_folder import read_records
 
@@ -55,9 +55,9 @@ def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
 
 
 def test_every_setting_is_an_option_of_run_and_sweep() -> None:
-    options = {option.name for option in trial_options()}
+    options = {option.name for option in make_trial_options()}
     assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"noise_level"}
-    assert options - {"seed"} <= {option.name for option in sweep_options()} | {"secret_seed_file"}
+    assert options - {"seed"} <= {option.name for option in make_sweep_options()} | {"secret_seed_file"}
 
 
 def test_the_environment_has_the_same_defaults() -> None:
@@ -71,7 +71,7 @@ def test_the_environment_has_the_same_defaults() -> None:
 
 def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     made = TrialConfig("block_on_block", 2.0, 0.5, 0.0, 0.5, method="uncorrected", seed=3, timestep_s=0.0005)
-    assert settings_of(setting_columns(made, "block_on_block"), "block_on_block") == made
+    assert restore_settings(list_setting_columns(made, "block_on_block"), "block_on_block") == made
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_a_trial_is_written_as_before() -> None:
     """Bytes are promised on one machine; everywhere the columns, their order, the settings and the ending are."""
     for line in (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()[:3]:
         before = json.loads(line)
-        again = run_trial(settings_of(before, before["scenario"]))
+        again = run_trial(restore_settings(before, before["scenario"]))
         assert [column for column in again if column in before] == list(before)
         same = [info.name for info in SETTINGS.values() if info.name in before]
         for column in (*same, "success", "failure_stage", "failure_code", "corrected_operations"):

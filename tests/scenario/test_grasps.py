@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
-from apo_bench.scenario.parts.making import Body, bore, extrude, join, rectangle, write_part
+from apo_bench.scenario.parts.making import Body, bore, extrude, join, make_rectangle, write_part
 from apo_bench.scenario.scenario import Grasp
 
 FILE = """schema = 1
@@ -27,7 +27,7 @@ move = "plate"
 goal = { at_mm = [0, 0, 0] }
 contacts = [["bottom", "table.top"]]
 """
-PLATE = extrude(rectangle(120, 120), 0, 12, bottom="bottom")
+PLATE = extrude(make_rectangle(120, 120), 0, 12, bottom="bottom")
 
 
 def grasp(folder: Path, body: Body) -> Grasp:
@@ -38,14 +38,14 @@ def grasp(folder: Path, body: Body) -> Grasp:
 
 
 def test_a_wide_tray_of_boxes_is_held_by_its_rim(tmp_path: Path):
-    rims = [extrude(rectangle(120, 8, (0, y)), 12, 30).prefixed(name) for name, y in (("a_", 56), ("b_", -56))]
+    rims = [extrude(make_rectangle(120, 8, (0, y)), 12, 30).prefixed(name) for name, y in (("a_", 56), ("b_", -56))]
     found = grasp(tmp_path, join(PLATE, *rims))
     np.testing.assert_allclose(np.abs(found.point[:2]), (0.0, 0.056), atol=1e-9)
     np.testing.assert_allclose(found.across, (0.0, 1.0, 0.0))
     assert 0.012 + 0.010 < found.point[2] < 0.030, "the pads end over the plate"
 
 
-BAR = extrude(rectangle(60, 20), 0, 20, bottom="bottom")
+BAR = extrude(make_rectangle(60, 20), 0, 20, bottom="bottom")
 LEANS = "[-0.5, 0, -0.8660254038]"
 
 
@@ -79,7 +79,7 @@ def test_a_tilted_grasp_that_cannot_be_one_is_named(tmp_path: Path, keys: str, w
 
 
 def test_a_plate_that_is_too_wide_both_ways_is_named_with_its_size_and_the_opening(tmp_path: Path):
-    plate = extrude(rectangle(120, 120), 0, 12, bores=[bore((0, 0), 5, 0, 12, "bore")], bottom="bottom")
+    plate = extrude(make_rectangle(120, 120), 0, 12, bores=[bore((0, 0), 5, 0, 12, "bore")], bottom="bottom")
     words = r"operation 1, grasp: 'plate', 120 x 120 x 12 mm, has no opposite faces.* within 80 mm"
     with pytest.raises(InputError, match=words):
         grasp(tmp_path, plate)

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import Layout, Scenario, draw_layout, load_scenario
-from apo_bench.assembly import placements
+from apo_bench.assembly import compute_placements
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.human_error import NOTHING_M, _displaced, human_error_covariance, spread_error
+from apo_bench.scenario.file import list_scenario_names
+from apo_bench.scenario.human_error import NOTHING_M, _displaced, compute_human_error_covariance, spread_error
 from apo_bench.scenario.scenario import HumanError
 from tests import rounds
 from tests.scenes import Scene
 
-SCENARIOS = {name: load_scenario(name) for name in scenario_names()}
+SCENARIOS = {name: load_scenario(name) for name in list_scenario_names()}
 CARELESS = sorted(name for name, scenario in SCENARIOS.items() if scenario.human_error)
 ALIKE = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}, "gearbox": {5, 6, 7}}
 """Operations, counted from 0, that show the error; elsewhere it is that of the error alone."""
@@ -56,7 +56,7 @@ def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, 
     allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
     offsets = spread_error(scenario, truth, np.array([x, y, 0.0])).offsets
     shown = truth.poses @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
-    poses = placements(scenario.assembly, truth.start, shown)[2]
+    poses = compute_placements(scenario.assembly, truth.start, shown)[2]
     face, on = (scenario.assembly.face(of) for of in scenario.assembly.operations[2].contacts[1])
     corner = pose.apply(pose.inverse(poses["cube"]) @ poses["castle2"], face.outline[:1])[0]
     assert on.plane[:3] @ corner + on.plane[3] == pytest.approx(0.0, abs=allowed)
@@ -77,7 +77,7 @@ def test_what_stands_on_a_displaced_part_and_moves_with_it_becomes_right_with_it
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_covariance_is_the_mean_square_of_every_operation_that_errs(name: str):
     scenario = SCENARIOS[name]
-    covariance = human_error_covariance(scenario, 2.0)
+    covariance = compute_human_error_covariance(scenario, 2.0)
     expected = np.zeros_like(covariance)
     if scenario.human_error is not None:
         square = (
@@ -86,7 +86,7 @@ def test_the_covariance_is_the_mean_square_of_every_operation_that_errs(name: st
         for k in ALIKE.get(name, {scenario.human_error.operation}):
             expected[k, :3, :3] = square
     assert covariance == pytest.approx(expected, abs=1e-18)
-    assert not human_error_covariance(scenario, 0.0).any()
+    assert not compute_human_error_covariance(scenario, 0.0).any()
 
 
 def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Scenario, draw_layout, load_scenario
-from apo_bench.assembly import Contact, Poses, placements
+from apo_bench.assembly import Contact, Poses, compute_placements
 from apo_bench.geometry import pose
-from apo_bench.geometry.covering import overlap
-from apo_bench.geometry.penetration import intrusion
-from apo_bench.scenario.layout import layout_at, nominal_start
+from apo_bench.geometry.covering import compute_overlap
+from apo_bench.geometry.penetration import measure_intrusion
+from apo_bench.scenario.layout import find_nominal_start, place_layout
 from apo_bench.scenario.scenario import Site, Turn
 from tests import scenes
 from tests.shipped import BOXES
@@ -37,7 +37,7 @@ def gap_m(assembly: Assembly, contact: Contact, poses: Poses) -> float:
 def overlap_m2(assembly: Assembly, contact: Contact, poses: Poses) -> float:
     face = assembly.face(contact.manipulated)
     on = assembly.face(contact.environment)
-    return overlap(face, poses[contact.manipulated.part], on, poses[contact.environment.part]).area
+    return compute_overlap(face, poses[contact.manipulated.part], on, poses[contact.environment.part]).area
 
 
 EXAMPLES = {
@@ -65,7 +65,7 @@ def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
     scenario = SCENARIOS[name]
-    stages = placements(scenario.assembly, scenario.start, scenario.goals)
+    stages = compute_placements(scenario.assembly, scenario.start, scenario.goals)
     gaps = [
         gap_m(scenario.assembly, contact, stages[k])
         for k, operation in enumerate(scenario.assembly.operations)
@@ -78,10 +78,10 @@ def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
 def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
-    nominal = placements(assembly, scenario.start, scenario.goals)
+    nominal = compute_placements(assembly, scenario.start, scenario.goals)
     for seed in GENERATOR_SEEDS:
         layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
-        stages = placements(assembly, layout.start, layout.poses)
+        stages = compute_placements(assembly, layout.start, layout.poses)
         for k, operation in enumerate(assembly.operations):
             for contact in operation.contacts:
                 assert gap_m(assembly, contact, stages[k]) < 1e-9
@@ -91,7 +91,7 @@ def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
             for other in set(assembly.solids) - {operation.main} if seed < 40 else ():
                 a = assembly.solids[operation.main]
                 b = assembly.solids[other]
-                assert intrusion(a, stages[k][operation.main], b, stages[k][other]) < 1e-9
+                assert measure_intrusion(a, stages[k][operation.main], b, stages[k][other]) < 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -143,7 +143,7 @@ def extremes(scenario: Scenario):
         x = site.center_m[0] + u * site.spread_m[0]
         y = site.center_m[1] + v * site.spread_m[1]
         for end in ("low_m", "high_m"):
-            yield layout_at(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
+            yield place_layout(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -170,8 +170,8 @@ def test_a_turn_is_one_about_its_point_and_leaves_what_shifts_draw(point: tuple[
     turn = Turn(0, np.array([0.0, 0.0, 1.0]), np.array(point), -0.2, 0.4)
     turned = replace(plain, turns=(turn,))
     for angle in (-0.2, 0.4):
-        layout = layout_at(turned, 0.1, 0.0, 0.3, turns_rad=[angle])
-        before = layout_at(plain, 0.1, 0.0, 0.3)
+        layout = place_layout(turned, 0.1, 0.0, 0.3, turns_rad=[angle])
+        before = place_layout(plain, 0.1, 0.0, 0.3)
         moved = pose.inverse(before.poses[0]) @ layout.poses[0]
         np.testing.assert_allclose(pose.apply(moved, np.array([point])), [point], rtol=0, atol=1e-12)
         assert np.arctan2(moved[1, 0], moved[0, 0]) == pytest.approx(angle)
@@ -190,7 +190,7 @@ def test_nominal_starts_are_seen_from_the_middle_of_where_the_site_may_be():
     """What follows the site starts as the file says; the site is at (0.1, -0.2) m, turned by 10 to 50 degrees."""
     site = Site(center_m=(0.1, -0.2), spread_m=(0.03, 0.03), yaw_rad=tuple(np.radians([10.0, 50.0])))
     scenario = replace(load_scenario("dovetail"), site=site)
-    start = nominal_start(scenario)
+    start = find_nominal_start(scenario)
     assert {*scenario.follows_site} == {"base1"}
     assert start["base1"] == pytest.approx(scenario.start["base1"], abs=1e-12)
     T_world_site = pose.at((0.1, -0.2, 0.0), (0.0, 0.0, 30.0))

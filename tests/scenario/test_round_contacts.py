@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.assembly import Contact, Gap, PartFace
 from apo_bench.io import convert_typed
-from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.checks import check_layouts
 from apo_bench.scenario.contacts import ContactGaps, read_contacts
 from apo_bench.scenario.play import check_clearance
 from apo_bench.scenario.scenario import Shift, Site
@@ -80,7 +80,7 @@ def test_play_by_the_sizes_is_play() -> None:
 
 @pytest.mark.parametrize("name", rounds.ALL)
 def test_scenes_of_round_and_tilted_parts_are_closed(name: str) -> None:
-    check_scenario(as_scenario(rounds.ALL[name](), site=Site((0.05, 0.0), (0.02, 0.02), (0.0, 0.4))), "mine.toml")
+    check_layouts(as_scenario(rounds.ALL[name](), site=Site((0.05, 0.0), (0.02, 0.02), (0.0, 0.4))), "mine.toml")
 
 
 def changed(of: Scene, operation: int, T: np.ndarray) -> Scene:
@@ -114,20 +114,20 @@ def with_part(of: Scene, part: Any) -> Scene:
 )
 def test_what_is_not_closed_is_named(of: Scene, words: str) -> None:
     with pytest.raises(InputError) as refused:
-        check_scenario(as_scenario(of), "mine.toml")
+        check_layouts(as_scenario(of), "mine.toml")
     assert words in str(refused.value)
 
 
 def test_a_thick_shaft_that_the_clearance_lets_in_is_inside_the_nominal_plate() -> None:
     """By nominal sizes it is 0.1 mm inside the wall, less what the sides of the prism that stands for it take off."""
     with pytest.raises(InputError, match=r"'peg' and 'plate' are 0.(1|09[5-9]).* mm inside each other"):
-        check_scenario(as_scenario(with_part(rounds.peg_in_plate(), rounds.peg(radius=5.1))), "mine.toml")
+        check_layouts(as_scenario(with_part(rounds.peg_in_plate(), rounds.peg(radius=5.1))), "mine.toml")
 
 
 def test_a_shaft_varied_out_of_its_bores_is_named() -> None:
     along = Shift(2, np.array([0.0, 0.0, 1.0]), -0.01, 0.09)
     with pytest.raises(InputError, match=r"vary: .* do not overlap when it is varied by 90 mm"):
-        check_scenario(as_scenario(rounds.through(), shifts=(along,)), "mine.toml")
+        check_layouts(as_scenario(rounds.through(), shifts=(along,)), "mine.toml")
 
 
 def test_a_clearance_that_leaves_a_shaft_no_play_is_named() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import InputError, read_arm
-from apo_bench.io import named_files
+from apo_bench.io import list_named_files
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.loading import compile_model, load_model
 
@@ -64,7 +64,7 @@ def test_an_arm_in_parts_with_materials_in_its_classes_is_built(tmp_path: Path) 
     plain = read_arm(ARMS / "ur5e_primitive.toml")
     assert arm.joints == plain.joints
     assert arm.opening_m == pytest.approx(plain.opening_m, abs=1e-4)
-    names = {each.name for each in named_files(tmp_path / "arm.xml")}
+    names = {each.name for each in list_named_files(tmp_path / "arm.xml")}
     assert names == {"arm.xml", "rest.xml", "link.obj"}
     assert {each.name for each in arm.files} == {*names, "arm.toml", "linkage_gripper.xml", "linkage_gripper.toml"}
 
@@ -80,7 +80,7 @@ def test_meshes_are_found_where_the_compiler_says(tmp_path: Path) -> None:
     (tmp_path / "assets" / "a.stl").write_bytes(b"")
     (mesh,) = load_model(tmp_path / "arm.xml", "arm").meshes
     assert mesh.file == str(tmp_path / "assets" / "a.stl")
-    assert named_files(tmp_path / "arm.xml") == (tmp_path / "arm.xml", tmp_path / "assets" / "a.stl")
+    assert list_named_files(tmp_path / "arm.xml") == (tmp_path / "arm.xml", tmp_path / "assets" / "a.stl")
 
 
 def test_a_mesh_that_is_stated_twice_is_read_once_as_robosuite_does(tmp_path: Path) -> None:

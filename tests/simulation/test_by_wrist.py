@@ -6,7 +6,7 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.simulation.robot.paths import smooth_trajectory, steady_trajectory, translate
+from apo_bench.simulation.robot.paths import plan_steady_trajectory, smooth_trajectory, translate
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.scene.world import allow_sleep, set_part_pose
 
@@ -47,7 +47,7 @@ def test_an_empty_hand_that_presses_on_the_table_is_stopped(arm: str, asleep: bo
     with allow_sleep(scene.work, asleep):
         robot = hand_at(scene, 0.1, 0.16, 0.02)
         with pytest.raises(ExecutionAborted) as aborted:
-            robot.follow(steady_trajectory(robot.T, translate(robot.T, DOWN, 0.025), 0.004))
+            robot.follow(plan_steady_trajectory(robot.T, translate(robot.T, DOWN, 0.025), 0.004))
         assert (aborted.value.code, aborted.value.part) == ("collision", "table")
         assert 20.0 < push_on_table(scene, robot) < HARDEST_N
 
@@ -59,7 +59,7 @@ def test_an_empty_hand_that_presses_on_the_wall_of_a_pocket_is_stopped() -> None
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, DOWN, 0.014), 0.05))
         assert push_on_table(scene, robot) == 0.0
         with pytest.raises(ExecutionAborted) as aborted:
-            robot.follow(steady_trajectory(robot.T, translate(robot.T, NORTH, 0.02), 0.004))
+            robot.follow(plan_steady_trajectory(robot.T, translate(robot.T, NORTH, 0.02), 0.004))
         assert (aborted.value.code, aborted.value.part) == ("collision", "table")
         assert 20.0 < push_on_table(scene, robot) < HARDEST_N
 

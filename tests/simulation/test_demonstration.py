@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
-from apo_bench.assembly import placements
+from apo_bench.assembly import compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands
@@ -45,7 +45,7 @@ def off_mm(of: SimulatedDemonstration) -> Array:
 def end_mm(of: SimulatedDemonstration, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
     human = of.demonstration
-    true = placements(human.assembly, of.layout.start, of.layout.poses)[-1][part]
+    true = compute_placements(human.assembly, of.layout.start, of.layout.poses)[-1][part]
     return 1e3 * (human.final[part] - true)[:3, 3]
 
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, replay, run_trial
-from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.geometry import measure_intrusion_depths, pose
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
 from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, translate
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.world import initial_state, part_pose
+from apo_bench.simulation.scene.world import get_part_pose, make_initial_state
 from apo_bench.trial.stages import simulate_demonstration
 
 
@@ -66,12 +66,12 @@ def test_cache_keys_differ_where_anything_before_differs():
     later = np.array(layout.poses)
     later[-1, :3, 3] += [0.0, 0.0, 1e-9]
     other = Plan(plan.assembly, plan.start, later)
-    a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
+    a, b = (cache_keys(scene(), layout.start, "full", plan_moves(p, scene())) for p in (plan, other))
     assert a[:-1] == b[:-1]
     assert a[-1] != b[-1]
-    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), layout.start, "near-contact", plan_moves(plan, scene())))
     elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
-    assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), elsewhere, "full", plan_moves(plan, scene())))
 
 
 def test_nothing_touches_on_skipped_stretches(monkeypatch):
@@ -86,7 +86,7 @@ def test_nothing_touches_on_skipped_stretches(monkeypatch):
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         held = self.forces.held
         moving = obstacles.moving_with_tip(its, self.data, self.tip(), self.opening(), held)
-        spans = obstacles.near_spans(its, self.data, moving, held, line, s)
+        spans = obstacles.find_near_spans(its, self.data, moving, held, line, s)
         edges = [0, *(edge for span in spans for edge in span), n]
         begin = float(self.data.time)
         skipped[:] = [
@@ -134,7 +134,7 @@ def test_near_contact_takes_as_much_simulated_time():
 
 def test_fast_forward_moves_hand_and_parts_as_one_rigid_body():
     its = scene()
-    data = initial_state(its.work, shown().layout.start)
+    data = make_initial_state(its.work, shown().layout.start)
     kinematics = its.kinematics
     model = its.work.model
     joints = [model.joint(f"arm/{name}").id for name in its.arm.joints]
@@ -144,26 +144,26 @@ def test_fast_forward_moves_hand_and_parts_as_one_rigid_body():
     held = ("stick",)
     others = [part for part in its.work.free if part != "stick"]
     before = kinematics.forward(data.qpos[at])
-    rest = [part_pose(its.work, data, part) for part in others]
-    in_hand = pose.inverse(before) @ part_pose(its.work, data, "stick")
+    rest = [get_part_pose(its.work, data, part) for part in others]
+    in_hand = pose.inverse(before) @ get_part_pose(its.work, data, "stick")
     velocity = np.array([0.3, -0.2, 0.1, 0.4, -0.5, 0.6])
     fast_forward(its.work, data, kinematics.forward, (at, dof), np.full(6, 0.05), velocity, held)
     assert data.qpos[at] == pytest.approx(np.asarray(its.arm.home) + 0.05)
     after = kinematics.forward(data.qpos[at])
-    assert pose.inverse(after) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-9)
-    assert [part_pose(its.work, data, part).tolist() for part in others] == [T.tolist() for T in rest]
+    assert pose.inverse(after) @ get_part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-9)
+    assert [get_part_pose(its.work, data, part).tolist() for part in others] == [T.tolist() for T in rest]
     dt = 1e-5
     mujoco.mj_integratePos(model, data.qpos, data.qvel, dt)
     later = kinematics.forward(data.qpos[at])
-    assert pose.inverse(later) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-7)
+    assert pose.inverse(later) @ get_part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-7)
 
 
 def test_no_turn_that_comes_near_anything_is_skipped():
     its = scene()
     rng = np.random.default_rng(5)
-    data = initial_state(its.work, shown().layout.start)
+    data = make_initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
-    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
+    hand = [obstacles.MovingPieces(its.pieces["stick"], np.eye(4))]
     came = 0
     skipped = 0
     for _ in range(60):
@@ -171,10 +171,10 @@ def test_no_turn_that_comes_near_anything_is_skipped():
         end = translate(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
         line = Trajectory(start, end, 0.2, np.asarray)
         s = np.linspace(0.0, 1.0, 201)
-        spans = obstacles.near_spans(its, data, hand, ("stick",), line, s)
+        spans = obstacles.find_near_spans(its, data, hand, ("stick",), line, s)
         for i, T in enumerate(line.poses(s)):
             depths = [
-                intrusion_depths(
+                measure_intrusion_depths(
                     its.pieces["stick"],
                     T[:3, :3],
                     T[None, :3, 3],

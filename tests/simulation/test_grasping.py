@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, Plan, Scene, build_scene, load_scenario, replay
-from apo_bench.assembly import Operation, Poses, Step, placements
-from apo_bench.geometry import Array, Box, intrusion_depths, pose
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.parts.making import Body, extrude, polygon, rectangle
+from apo_bench.assembly import Operation, Poses, Step, compute_placements
+from apo_bench.geometry import Array, Box, measure_intrusion_depths, pose
+from apo_bench.scenario.layout import place_layout
+from apo_bench.scenario.parts.making import Body, extrude, make_polygon, make_rectangle
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.grasping import (
@@ -17,12 +17,12 @@ from apo_bench.simulation.execution.grasping import (
     clear_across,
     grasp_at,
     half_width,
-    obstacles,
+    list_obstacles,
 )
-from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.prepare import Move, plan_moves
 from apo_bench.simulation.execution.transfer import is_tilted
-from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.obstacles import obstacle
+from apo_bench.simulation.robot.gripper import list_gripper_boxes
+from apo_bench.simulation.robot.obstacles import make_obstacle
 from tests.round_scenes import contacts, scenario
 
 
@@ -38,29 +38,29 @@ def fixture() -> Scene:
 
 def nominal(scene: Scene, schedule: tuple[Step, ...] = ()) -> Plan:
     site = scene.scenario.site
-    at = layout_at(scene.scenario, *site.center_m, sum(site.yaw_rad) / 2, clearance_mm=scene.clearance_mm)
+    at = place_layout(scene.scenario, *site.center_m, sum(site.yaw_rad) / 2, clearance_mm=scene.clearance_mm)
     return Plan(scene.scenario.assembly, at.start, at.poses, schedule)
 
 
 def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float, poses: Poses) -> float:
     """How deep the gripper is in any part but the moved one."""
-    boxes = gripper_boxes(scene.kinematics, opening)
+    boxes = list_gripper_boxes(scene.kinematics, opening)
     T = T_part @ T_tip
-    around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
-    return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.pieces, o.T)[0]) for o in around)
+    around = list_obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
+    return max(float(measure_intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.pieces, o.T)[0]) for o in around)
 
 
 def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
     """Example of Fig. 6, step 5: no single grasp passes the cubes, so the grip changes between them."""
     plan = nominal(pockets)
-    move = moves(plan, pockets)[4]
+    move = plan_moves(plan, pockets)[4]
     first, second = move.transfer.grips
     left = move.transfer.into.left
     assert left is not None
     assert 0.01 < left < 0.05
     assert first.T_part_tip[0, 3] < -0.05
     assert abs(second.T_part_tip[0, 3]) < 0.025
-    poses = placements(plan.assembly, plan.start, plan.target_poses)[4]
+    poses = compute_placements(plan.assembly, plan.start, plan.target_poses)[4]
     goal = plan.target_poses[4]
     for back in np.linspace(move.transfer.into.travel, left, 60):
         at = goal @ pose.at((-back, 0, 0))
@@ -72,7 +72,7 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
 
 def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
     schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
-    done = moves(nominal(fixture, schedule), fixture)
+    done = plan_moves(nominal(fixture, schedule), fixture)
     towards = fixture_side(fixture)
     (side,) = done[2].transfer.sides
     np.testing.assert_allclose(side, towards, atol=1e-9)
@@ -103,15 +103,15 @@ def one_part(folder: Path, body: Body, grasp: Grasp, density: float = 1000.0, fr
 def bracket() -> Body:
     """L-shaped, standing on its foot."""
     names = ("bottom", "end", "tread", "inner", "tip", "back")
-    outline = polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40), names=names)
+    outline = make_polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40), names=names)
     return extrude(outline, -10, 10).moved((0, 0, 0), (90, 0, 0))
 
 
 def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path) -> None:
     scene = one_part(tmp_path, bracket(), SIDEWAYS)
     T = scene.scenario.start["part"]
-    around = obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
-    wall = obstacle((Box("wall", np.array([0.018, 0.03, 0.03]), np.array([0.03, 0.005, 0.03])),), T)
+    around = list_obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
+    wall = make_obstacle((Box("wall", np.array([0.018, 0.03, 0.03]), np.array([0.03, 0.005, 0.03])),), T)
     assert grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, around)]) is SIDEWAYS
     grasp = grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, (*around, wall))])
     assert abs(grasp.across[0]) == 1.0
@@ -121,25 +121,25 @@ def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path
 def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path: Path) -> None:
     scene = one_part(tmp_path, bracket(), SIDEWAYS)
     T = scene.scenario.start["part"]
-    around = obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
+    around = list_obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
     for half, clear in ((0.005, False), (0.002, True)):
         size = np.array([half, 0.01, 0.02])
         walls = [Box(f"wall{side}", np.array([0.005, side * 0.0205, 0.02]), size) for side in (-1, 1)]
-        grasp = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, obstacle(tuple(walls), T))))
+        grasp = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, make_obstacle(tuple(walls), T))))
         assert (grasp is not None) == clear
 
 
 def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
     ahead = np.array([-0.5, 0.0, -np.sqrt(0.75)])
-    bar = extrude(rectangle(60, 20), 0, 40, bottom="bottom")
+    bar = extrude(make_rectangle(60, 20), 0, 40, bottom="bottom")
     scene = one_part(tmp_path, bar, Grasp(np.array([0.0, 0.0, 0.03]), np.array([0.0, 1.0, 0.0]), ahead=ahead))
     for yaw in (0.2, np.pi):  # one of them is reached the other way round
-        layout = layout_at(scene.scenario, 0.1, 0.0, yaw)
+        layout = place_layout(scene.scenario, 0.1, 0.0, yaw)
         plan = Plan(scene.scenario.assembly, layout.start, layout.poses)
-        (move,) = moves(plan, scene)
+        (move,) = plan_moves(plan, scene)
         np.testing.assert_allclose(move.transfer.grips[0].T_part_tip[:3, 2], ahead, atol=1e-12)
         assert is_tilted(move.transfer.T_world_start @ move.transfer.grips[0].T_part_tip)
-    layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
+    layout = place_layout(scene.scenario, 0.1, 0.0, 0.2)
     result = replay(
         Plan(scene.scenario.assembly, layout.start, layout.poses), scene, config=ExecutionConfig("near-contact")
     )
@@ -154,14 +154,14 @@ def test_what_cannot_be_held_is_named_before_anything_moves(
     tmp_path: Path, width: float, density: float, words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
-        one_part(tmp_path, extrude(rectangle(120, width), 0, 60, bottom="bottom"), SIDEWAYS, density)
+        one_part(tmp_path, extrude(make_rectangle(120, width), 0, 60, bottom="bottom"), SIDEWAYS, density)
 
 
 def test_a_part_that_is_too_smooth_is_named_and_one_that_is_not_slips_no_more_than_others(tmp_path: Path) -> None:
-    cube = extrude(rectangle(60, 40), 0, 40, bottom="bottom")
+    cube = extrude(make_rectangle(60, 40), 0, 40, bottom="bottom")
     with pytest.raises(InputError, match=r"'part', which is too smooth: with its friction of 0\.02 the gripper holds"):
         one_part(tmp_path, cube, SIDEWAYS, friction=0.02)
     scene = one_part(tmp_path, cube, SIDEWAYS, friction=0.2)
-    layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
+    layout = place_layout(scene.scenario, 0.1, 0.0, 0.2)
     (moved,) = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene).in_hand
     assert moved.moved_m < 1e-3

@@ -8,7 +8,7 @@ import pytest
 from apo_bench import Plan, Scenario, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.scenario.attach_lines import nominal_operations
+from apo_bench.scenario.attach_lines import list_nominal_operations
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.trial.stages import Attempt, replay_and_judge
 
@@ -46,7 +46,7 @@ def done(
 
 
 def names(scenario: Scenario) -> list[list[str]]:
-    return [list(each.names) for each in nominal_operations(scenario)]
+    return [list(each.names) for each in list_nominal_operations(scenario)]
 
 
 @pytest.mark.parametrize("short_mm", [1.0, -2.0])

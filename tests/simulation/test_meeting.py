@@ -10,7 +10,7 @@ from apo_bench.geometry import Hull, pose
 from apo_bench.simulation.scene.contact_bits import Bits, is_lining, meetings, widest_disc
 from apo_bench.simulation.scene.hulls import clip_hull, join_convex, volume
 from apo_bench.simulation.scene.walls import COARSE_M, linings, simulated_pieces
-from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
+from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
 
 CLEARANCE_M = 0.25e-3
 ROUND = ("nested_bushings", "l_bracket_on_plate")
@@ -66,7 +66,7 @@ def play(world: World, data: mujoco.MjData, angle: float, off_m: float) -> int:
 
 
 def test_a_peg_has_its_play_in_every_direction(scene: Scene) -> None:
-    data = initial_state(scene.shown, scene.scenario.start)
+    data = make_initial_state(scene.shown, scene.scenario.start)
     for angle in np.radians(np.arange(0.0, 360.0, 3.7)):
         assert play(scene.shown, data, angle, CLEARANCE_M - 1e-6) == 0
         assert play(scene.shown, data, angle, CLEARANCE_M + COARSE_M) > 0

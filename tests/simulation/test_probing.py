@@ -8,7 +8,7 @@ import pytest
 
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.records import ft_noise
+from apo_bench.records import parse_ft_noise
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.probing.places import floor_places, wall_places
@@ -16,7 +16,7 @@ from apo_bench.simulation.execution.probing.state import ProbingState, touch_gua
 from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import filtered_noise, low_pass_part
+from apo_bench.simulation.robot.wrist import compute_low_pass_gain, filter_noise
 from apo_bench.trial.run import probing_config
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
 
@@ -95,7 +95,7 @@ def test_a_robot_farther_off_than_assumed_strikes_the_floor_before_any_operation
 
 
 def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
-    felt = filtered_noise(ft_noise("10/5"), low_pass_part())
+    felt = filter_noise(parse_ft_noise("10/5"), compute_low_pass_gain())
     assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 

@@ -8,14 +8,14 @@ import pytest
 
 from apo_bench import Film, InputError, Scene, aim_camera, draw_layout
 from apo_bench.simulation.scene.render import save_film
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene.world import make_initial_state
 from apo_bench.trial.request import Request, run_request
 
 SIZE = (160, 120)
 
 
 def test_the_end_of_one_film_does_not_spoil_the_next(tower: Scene) -> None:
-    data = initial_state(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
+    data = make_initial_state(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
     first = Film(tower, width=SIZE[0], height=SIZE[1], camera=aim_camera(np.zeros(3), 1.0))
     first(data)
     second = Film(tower, width=SIZE[0], height=SIZE[1], camera=aim_camera(np.zeros(3), 1.0))

@@ -9,12 +9,12 @@ from scipy.spatial import ConvexHull
 
 from apo_bench import Plan, Scene, build_scene, demonstrate, draw_layout, replay
 from apo_bench.assembly import Operation
-from apo_bench.geometry import SAGITTA_M, Hull, Piece, physical_pieces, pose
-from apo_bench.scenario.parts.making import shaft, solid_of
+from apo_bench.geometry import SAGITTA_M, Hull, Piece, pose, shrink_pieces
+from apo_bench.scenario.parts.making import build_solid, make_shaft
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.walls import simulated_pieces
-from apo_bench.simulation.scene.world import World, initial_state, part_pose, set_part_pose
+from apo_bench.simulation.scene.world import World, get_part_pose, make_initial_state, set_part_pose
 from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario
 
 
@@ -42,7 +42,7 @@ def made_of(scene: Scene, part: str) -> list[Piece]:
 
 def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
     T = pose.at((0.2, -0.1, 0.3), (20.0, -50.0, 130.0))
-    data = initial_state(scene.work, scene.scenario.start)
+    data = make_initial_state(scene.work, scene.scenario.start)
     set_part_pose(scene.work, data, "plate", T)
     mujoco.mj_kinematics(scene.work.model, data)
     for piece in made_of(scene, "plate"):
@@ -70,8 +70,8 @@ def test_mass_and_inertia_are_those_of_the_exact_solid(scene: Scene, part: str):
 
 @pytest.mark.parametrize("clearance_m", [0.0, 0.00025])
 def test_walls_and_what_is_behind_them_are_the_same_part(clearance_m: float):
-    solid = solid_of("plate", PLATE)
-    whole = physical_pieces(solid, clearance_m)
+    solid = build_solid("plate", PLATE)
+    whole = shrink_pieces(solid, clearance_m)
     cut = [p for several in simulated_pieces(solid, clearance_m).values() for p in several]
     corners = [
         p.corners if isinstance(p, Hull) else p.center + p.half * np.array([[1, 1, 1], [-1, -1, -1]]) for p in cut
@@ -94,9 +94,9 @@ def test_flat_ends_that_graze_a_round_part_are_not_found_deep_inside_of_it(tmp_p
     ]
     start = {"plate": pose.at((0, -0.27, 0)), "stub": pose.at((0, 0.27, 0))}
     grasps = [Grasp(np.array([0.0, 0.0, 0.02]), np.array([1.0, 0.0, 0.0]))] * 2
-    bodies = {"plate": PLATE, "stub": shaft(11, 0, 40, "wall", bottom="bottom", top="top")}
+    bodies = {"plate": PLATE, "stub": make_shaft(11, 0, 40, "wall", bottom="bottom", top="top")}
     its = build_scene(scenario(tmp_path, bodies, operations, [np.eye(4), pose.at((0, 0, 0.04))], start, grasps)).shown
-    data = initial_state(its, start | {"table": np.eye(4)})
+    data = make_initial_state(its, start | {"table": np.eye(4)})
     rng = np.random.default_rng(0)
     stub = pose.at((0.3, 0.2, 0.3))
     set_part_pose(its, data, "stub", stub)
@@ -110,11 +110,11 @@ def test_flat_ends_that_graze_a_round_part_are_not_found_deep_inside_of_it(tmp_p
 
 def test_a_peg_stands_on_its_end_and_one_that_lies_stays(scene: Scene):
     for turn in ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 30.0)):
-        data = initial_state(scene.shown, scene.scenario.start)
+        data = make_initial_state(scene.shown, scene.scenario.start)
         T = pose.at((0.1, 0.1, 0.025 if turn == (0.0, 0.0, 0.0) else 0.005), turn)
         set_part_pose(scene.shown, data, "peg", T)
         mujoco.mj_step(scene.shown.model, data, 1500)
-        off = pose.inverse(T) @ part_pose(scene.shown, data, "peg")
+        off = pose.inverse(T) @ get_part_pose(scene.shown, data, "peg")
         assert np.abs(off[:3, 3]).max() < 2e-5  # without friction of rolling one that lies is centimetres away
         assert np.abs(off[:3, :3] - np.eye(3)).max() < 2e-3
         v = scene.shown.dof["peg"]
@@ -132,7 +132,7 @@ def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, m
 
     def look(robot: Robot, on: bool) -> None:
         tip = robot.tip()
-        held.append(pose.inverse(tip) @ part_pose(scene.work, robot.data, robot.forces.held[0]))
+        held.append(pose.inverse(tip) @ get_part_pose(scene.work, robot.data, robot.forces.held[0]))
         steady(robot, on)
 
     monkeypatch.setattr(Robot, "steady", look)

@@ -10,13 +10,13 @@ import pytest
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import pose
 from apo_bench.simulation.execution import ExecutionConfig, search
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.search import RADIUS_M, press_in
 from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
 from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.robot.paths import steady_trajectory, translate
+from apo_bench.simulation.robot.paths import plan_steady_trajectory, translate
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
@@ -101,13 +101,13 @@ def test_cached_beginnings_change_no_byte():
 
 def test_only_insertions_have_a_search():
     plan = aside("carried_bridge", 0.0)
-    done = [move.transfer for move in moves(plan, scene("carried_bridge"), spiral=True)]
+    done = [move.transfer for move in plan_moves(plan, scene("carried_bridge"), spiral=True)]
     assert [t.front is not None for t in done] == [False, False, False, True, True]
     stick, cube = done[3:]
     assert abs(stick.front[0]) == pytest.approx(0.11, abs=1e-3), "the end of the stick, less the clearance"
     assert np.abs(stick.front[1:]).max() == pytest.approx(0.0, abs=1e-9)
     assert cube.front[2] == pytest.approx(-0.025, abs=1e-3), "the bottom of the cube"
-    assert all(move.transfer.front is None for move in moves(plan, scene("carried_bridge")))
+    assert all(move.transfer.front is None for move in plan_moves(plan, scene("carried_bridge")))
 
 
 @pytest.mark.parametrize("direction", [DOWN, np.array([0.6, -0.8, 0.0])])
@@ -137,5 +137,5 @@ def test_two_searches_in_one_motion_bring_every_pose_to_where_the_second_ended(m
     robot = SimpleNamespace(T=stopped, macro="insert-into", follow=lambda line, guard: 0.01)
     grip = Grip(np.eye(4), 0.01)
     transfer = SimpleNamespace(front=np.zeros(3), slide_n=1.0)
-    _, T_search = press_in(robot, transfer, grip, steady_trajectory(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
+    _, T_search = press_in(robot, transfer, grip, plan_steady_trajectory(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
     assert T_search == pytest.approx(second @ first)

@@ -10,14 +10,14 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.robot.by_wrist import comply, press, reading, wrist_of, zero
-from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, zero
+from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import weld
-from apo_bench.simulation.robot.paths import smooth_trajectory, steady_trajectory, translate
+from apo_bench.simulation.robot.paths import plan_steady_trajectory, smooth_trajectory, translate
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import READING_S, WristSensor, part_loads
-from apo_bench.simulation.scene.world import allow_sleep, part_pose, set_part_pose
+from apo_bench.simulation.robot.wrist import READING_S, WristSensor, compute_part_loads
+from apo_bench.simulation.scene.world import allow_sleep, get_part_pose, set_part_pose
 
 DOWN = np.array([0.0, 0.0, -1.0])
 UP = -DOWN
@@ -31,7 +31,7 @@ def scene_of(arm: str = "six_axis", grasp: str = "friction", step_s: float = 0.0
 def empty_hand(scene: Scene, name: str, z: float, seed: int = 1) -> tuple[Robot, WristSensor]:
     """A robot whose wrist was zeroed, its closed hand above the table at a height of the tip, [m]."""
     robot = Robot(scene, scene.scenario.start)
-    wrist = wrist_of(robot, name, np.random.default_rng(seed))
+    wrist = get_wrist(robot, name, np.random.default_rng(seed))
     robot.fingers(0.002)
     T = pose.at((0.0, 0.0, 0.0)) @ robot.T
     T[:3, 3] = 0.1, 0.16, 0.2
@@ -53,7 +53,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
     start["stick"] = pose.at((0.1, 0.16, 0.01))
     robot = Robot(scene, start)
     set_part_pose(scene.work, robot.data, "stick", start["stick"])
-    wrist = wrist_of(robot, name, np.random.default_rng(1), **settings)
+    wrist = get_wrist(robot, name, np.random.default_rng(1), **settings)
     T = np.array(robot.T)
     T[:3, 0] = 0.0, -1.0, 0.0
     T[:3, 1] = -1.0, 0.0, 0.0
@@ -70,8 +70,8 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
         weld(scene, robot.data, "stick", True)
     robot.forces.hold("stick")
     robot.stand()
-    T_tip_stick = pose.inverse(robot.tip()) @ part_pose(scene.work, robot.data, "stick")
-    wrist.hold(*part_loads(scene, {"stick": T_tip_stick}))
+    T_tip_stick = pose.inverse(robot.tip()) @ get_part_pose(scene.work, robot.data, "stick")
+    wrist.hold(*compute_part_loads(scene, {"stick": T_tip_stick}))
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, lift), 0.2))
     robot.stand()
     return robot, wrist, T_tip_stick
@@ -79,7 +79,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
 
 def mean_wrench(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -> Array:
     """The mean wrench while the robot stands, (6,)."""
-    with reading(robot, wrist):
+    with read_wrist(robot, wrist):
         out = []
         for _ in range(round(seconds / 0.004)):
             robot.wait(0.004)
@@ -109,11 +109,11 @@ def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with allow_sleep(scene.work, asleep):
         robot, wrist = empty_hand(scene, "wrist", 0.014)
-        left = press(robot, steady_trajectory(robot.T, translate(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
+        left = press(robot, plan_steady_trajectory(robot.T, translate(robot.T, DOWN, 0.01), 0.002), DOWN, 2.0, wrist)
         assert left is not None
         assert robot.wrist is None
         assert np.linalg.norm(robot.T[:3, 3] - translate(robot.T, UP, 0.0)[:3, 3]) == 0.0
-        reach = max(box.center[2] + box.half[2] for box in gripper_boxes(scene.kinematics, 0.002))
+        reach = max(box.center[2] + box.half[2] for box in list_gripper_boxes(scene.kinematics, 0.002))
         assert robot.T[2, 3] == pytest.approx(reach, abs=5e-5)
         assert left == pytest.approx(robot.T[2, 3] - 0.004, abs=1e-4)
 
@@ -142,7 +142,7 @@ def test_the_wrench_of_a_push_is_that_of_its_contacts(arm: str, newton: float) -
         robot, wrist = empty_hand(scene, "ideal", 0.0102)
         comply(robot, Pushing(newton, 1.5), robot.T[:3, 3], wrist)
         tip = robot.T[:3, 3]
-        with reading(robot, wrist):
+        with read_wrist(robot, wrist):
             robot.wait(0.2)
             wrench = wrist.wrench(tip)
         assert wrench[2] == pytest.approx(newton, abs=0.02)
@@ -191,10 +191,10 @@ def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, alon
     robot, wrist, _ = with_stick(grasp, "wrist", along, 0.004)
     at = pose.at(robot.T[:3, 3])
     robot.go(at @ pose.at((0, 0, 0), (0, tilt_deg, 0)) @ pose.inverse(at) @ robot.T, 0.1)
-    pitch = [np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0]))]
+    pitch = [np.degrees(np.arcsin(get_part_pose(robot.scene.work, robot.data, "stick")[2, 0]))]
     law = Levelling(3.0, 6.0)
     comply(robot, law, robot.T[:3, 3], wrist)
-    pitch.append(np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0])))
+    pitch.append(np.degrees(np.arcsin(get_part_pose(robot.scene.work, robot.data, "stick")[2, 0])))
     assert pitch[0] == pytest.approx(-tilt_deg, abs=0.01)
     assert abs(pitch[1]) < 0.01
     first = next(wrench for wrench in law.wrenches if wrench[2] > 1.0)
@@ -215,7 +215,7 @@ def test_joint_errors_turn_the_weight_that_is_subtracted() -> None:
     scene = scene_of()
     off = np.radians([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     robot = Robot(scene, scene.scenario.start, error=RobotError(np.eye(4), off, np.eye(4), np.eye(4)[None]))
-    wrist = wrist_of(robot, "ideal", np.random.default_rng(1))
+    wrist = get_wrist(robot, "ideal", np.random.default_rng(1))
     zero(robot, wrist)
     assert robot.encoders() == pytest.approx(robot.q, abs=1e-4)
     assert np.abs(mean_wrench(robot, wrist, robot.T[:3, 3])[:3]).max() < 0.01

@@ -12,7 +12,7 @@ from apo_bench import Scene
 from apo_bench.records import FtNoise
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, WristSensor
-from apo_bench.simulation.scene.world import wrist_sensors_on
+from apo_bench.simulation.scene.world import switch_wrist_sensors_on
 
 
 def wrist(scene: Scene, noise: FtNoise, seed: int = 1, **settings) -> SimpleNamespace:
@@ -104,10 +104,10 @@ def test_the_wrist_sensors_are_off_unless_switched_on(tower: Scene) -> None:
     for _ in range(3):
         mujoco.mj_step(model, data)
     assert not data.sensordata[-6:].any()
-    with wrist_sensors_on(model):
+    with switch_wrist_sensors_on(model):
         mujoco.mj_step(model, data)
         assert data.sensordata[-6:].any()
-        with pytest.raises(RuntimeError), wrist_sensors_on(model):
+        with pytest.raises(RuntimeError), switch_wrist_sensors_on(model):
             raise RuntimeError
         assert model.sensor_needstage[-2:].tolist() == [3, 3]
     assert model.sensor_needstage[-2:].tolist() == [0, 0]

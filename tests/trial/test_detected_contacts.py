@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.analysis import ALL, detections
+from apo_bench.benchmark.analysis import ALL, tabulate_detection
 from apo_bench.benchmark.report.tables.methods import detection_table
 from apo_bench.cli import app as cli
 from apo_bench.records import DETECTED
@@ -79,7 +79,9 @@ def test_missed_and_false_relations_are_counted_like_recognised_ones(
 
 def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
     rows = [row("detected", "paper"), row("detected", "contact"), row("detected", seed=1, contacts_false_negative=1)]
-    (found,) = detections([*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)])
+    (found,) = tabulate_detection(
+        [*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)]
+    )
     assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [
         2,
         (1, 2),
@@ -93,14 +95,14 @@ def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
 
 def test_scenarios_are_also_counted_together() -> None:
     rows = [row("detected"), row("detected", scenario="two", contacts_true_positive=1, contacts_false_positive=2)]
-    found = {line["scenario"]: line for line in detections(rows)}
+    found = {line["scenario"]: line for line in tabulate_detection(rows)}
     assert list(found) == ["one", "two", ALL]
     assert [found[ALL][name] for name in ("demonstrations", "complete", "right", "false")] == [2, (1, 2), 4, 2]
     assert found["two"]["precision"] == pytest.approx(1 / 3)
 
 
 def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
-    found = detections([row("detected-jointly", contacts_true_positive=0, contacts_false_negative=3)])
+    found = tabulate_detection([row("detected-jointly", contacts_true_positive=0, contacts_false_negative=3)])
     assert (found[0]["precision"], found[0]["recall"]) == (None, 0.0)
     assert detection_table(found).markdown()[-1].endswith("| 3 | 0 | – | 0.00 % |")
     assert detection_table(()).markdown() == ["No method used detected contacts."]

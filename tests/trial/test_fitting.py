@@ -22,8 +22,8 @@ from apo_bench import (
     load_scenario,
     run_trial,
 )
-from apo_bench.assembly import Step, contact_equations
-from apo_bench.correction.solvers.whitened import correction_to, noise_factor
+from apo_bench.assembly import Step, build_contact_equations
+from apo_bench.correction.solvers.whitened import factor_noise, whiten_poses
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.planning.prediction.failure import Prediction, predict
@@ -84,7 +84,8 @@ def test_contacts_hold_as_they_did(seed: int) -> None:
     seen = seen_at("carried_bridge", seed)
     correction, found = planned("carried_bridge", seed)
     before, after = (
-        contact_equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.poses, found.plan.target_poses)
+        build_contact_equations(seen.assembly, seen.start, T).gaps(T)
+        for T in (correction.poses, found.plan.target_poses)
     )
     assert before.max() < 1e-9
     assert after.max() < 1e-9
@@ -130,8 +131,8 @@ def test_nothing_nearer_on_the_way_back_fits_with_room() -> None:
     relative = [pose.inverse(T[k]) @ T[4] for T in (correction.poses, found.plan.target_poses) for k in (0, 1)]
     moved_mm = max(1e3 * abs(relative[i][0, 3] - relative[i + 2][0, 3]) for i in (0, 1))
     assert deep_mm + 2.0 == pytest.approx(moved_mm, abs=0.2)
-    L = noise_factor(seen)
-    lengths = [np.linalg.norm(correction_to(seen.poses, L, T)) for T in (correction.poses, found.plan.target_poses)]
+    L = factor_noise(seen)
+    lengths = [np.linalg.norm(whiten_poses(seen.poses, L, T)) for T in (correction.poses, found.plan.target_poses)]
     assert lengths[0] < lengths[1] < lengths[0] + 1.0
 
 

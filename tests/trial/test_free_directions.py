@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import Observation
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from apo_bench.geometry import Array
 from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
 from tests import scenes
@@ -68,7 +68,7 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
         s = 3.0 * rng.normal(size=len(space))
         goals = space.place(s)
         assert goals is not None
-        assert contact_equations(scene.assembly, scene.start, goals).gaps(goals).max() < 1e-9
+        assert build_contact_equations(scene.assembly, scene.start, goals).gaps(goals).max() < 1e-9
         np.testing.assert_allclose(goals[:, :3, 3], space.tangent(s)[:, :3, 3], atol=3e-3)
 
 
@@ -80,10 +80,10 @@ def test_contacts_that_are_open_may_stay_open() -> None:
     space = free_space(is_uncorrected(scene), goals)
     assert space is not None
     assert len(space) > len(space_of(scene))
-    before = contact_equations(scene.assembly, scene.start, goals).gaps(goals)
+    before = build_contact_equations(scene.assembly, scene.start, goals).gaps(goals)
     moved = space.place(np.full(len(space), 0.5))
     assert moved is not None
-    after = contact_equations(scene.assembly, scene.start, moved).gaps(moved)
+    after = build_contact_equations(scene.assembly, scene.start, moved).gaps(moved)
     assert (after[before < 1e-9] < 1e-9).all()
 
 

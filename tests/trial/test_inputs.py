@@ -15,7 +15,7 @@ import trimesh
 
 import apo_bench
 from apo_bench import InputError, SweepConfig, run_sweep
-from apo_bench.io import named_files
+from apo_bench.io import list_named_files
 from apo_bench.resources import folder
 from apo_bench.trial.inputs import module_files, own_content
 
@@ -224,9 +224,9 @@ def test_a_model_names_its_files_wherever_they_are_stated(tmp_path: Path) -> Non
     (tmp_path / "deep" / "inner.xml").write_text(
         '<mujoco><asset><mesh file="somewhere/own.stl"/></asset><include file="../arm.xml"/></mujoco>'
     )
-    names = [file.relative_to(tmp_path).as_posix() for file in named_files(tmp_path / "arm.xml")]
+    names = [file.relative_to(tmp_path).as_posix() for file in list_named_files(tmp_path / "arm.xml")]
     assert names == ["arm.xml", "deep/inner.xml", "a/mesh.stl", "a/skin.png", "deep/own.stl"]
-    assert named_files(tmp_path / "not_there.xml") == (tmp_path / "not_there.xml",)
+    assert list_named_files(tmp_path / "not_there.xml") == (tmp_path / "not_there.xml",)
 
 
 def test_your_own_code_counts_where_it_makes_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench import Observation, Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from apo_bench.trial.nominal import fit_nominal_poses
 from apo_bench.trial.planning import apply_method
 
@@ -26,14 +26,14 @@ def seen(goals: Array, sigma: float = 1e-3) -> Observation:
 @pytest.mark.parametrize("yaw", [0.4, 3.1])
 def test_a_nominal_layout_is_found_wherever_it_stands(yaw: float) -> None:
     """The solver stops at a relative step of 1e-8: 1e-8 m was found."""
-    layout = layout_at(SCENARIO, 0.13, -0.05, yaw)
+    layout = place_layout(SCENARIO, 0.13, -0.05, yaw)
     np.testing.assert_allclose(fit_nominal_poses(SCENARIO.goals, seen(layout.poses)), layout.poses, rtol=0, atol=1e-6)
 
 
 def test_the_assembly_is_always_the_same() -> None:
     """Whatever was seen, goals lie to each other as in the file, and the assembly stands level on the table."""
     rng = np.random.default_rng(3)
-    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses @ np.array(
+    goals = place_layout(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses @ np.array(
         [pose.exp(np.repeat([4e-3, 0.07], 3) * rng.standard_normal(6)) for _ in SCENARIO.goals]
     )
     planned = fit_nominal_poses(SCENARIO.goals, seen(goals))
@@ -45,7 +45,7 @@ def test_the_assembly_is_always_the_same() -> None:
 
 def test_no_other_place_fits_better() -> None:
     """The sum of squares of the twists, a quadratic form of body twists, is least where the goals were put."""
-    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses
+    goals = place_layout(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses
     found = fit_nominal_poses(SCENARIO.goals, seen(goals))
 
     def misfit(planned: Array) -> float:
@@ -58,7 +58,7 @@ def test_no_other_place_fits_better() -> None:
 
 
 def test_operations_that_were_not_seen_are_left_out() -> None:
-    layout = layout_at(SCENARIO, 0.13, -0.05, 0.3)
+    layout = place_layout(SCENARIO, 0.13, -0.05, 0.3)
     goals = np.array(layout.poses)
     goals[1, :3, 3] += 1.0
     partly = replace(seen(goals), observed=np.array([True, False, True]))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Poses, Reached, Snapshot, contact_equations, placements
+from apo_bench.assembly import Poses, ReachedState, Snapshot, build_contact_equations, compute_placements
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry import Array, pose
 from apo_bench.trial.pose_error import goal_errors, pose_errors
@@ -22,9 +22,9 @@ def state(poses: Poses) -> Snapshot:
     return Snapshot(poses, penetration_m=0.0, speed_m_s=0.0, spin_rad_s=0.0, released=True)
 
 
-def reached(scene: scenes.Scene, goals: Array) -> Reached:
-    after = tuple(state(poses) for poses in placements(scene.assembly, scene.start, goals))
-    return Reached(after, after[-1])
+def reached(scene: scenes.Scene, goals: Array) -> ReachedState:
+    after = tuple(state(poses) for poses in compute_placements(scene.assembly, scene.start, goals))
+    return ReachedState(after, after[-1])
 
 
 def errors(scene: scenes.Scene, wrong: Mapping[int, Array]) -> tuple[float | None, float | None]:
@@ -71,7 +71,7 @@ def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:
     fixed, free = errors(scene, {2: error})
     goals = scene.goals.copy()
     goals[1] = goals[1] @ error
-    mended = solve_newton(contact_equations(scene.assembly, scene.start, goals), goals, range(3)).poses
+    mended = solve_newton(build_contact_equations(scene.assembly, scene.start, goals), goals, range(3)).poses
     taken_back = pose.log(pose.inverse(goals) @ mended) * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed == pytest.approx(np.linalg.norm(taken_back) / np.sqrt(3), rel=1e-3)
     assert fixed == pytest.approx(0.0997, abs=1e-4)
@@ -98,5 +98,5 @@ def test_the_two_parts_add_up_and_no_frame_matters(seed: int) -> None:
 def test_an_operation_that_was_not_finished_has_no_error() -> None:
     scene = scenes.stick_in_tower()
     whole = reached(scene, scene.goals)
-    partly = Reached((whole.after[0], None, None), None)
+    partly = ReachedState((whole.after[0], None, None), None)
     assert pose_errors(scene.assembly, scene.start, scene.goals, partly) == (None, None)

@@ -19,7 +19,7 @@ from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial import run
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.predicted_success import Explanation, abstain, draw_truths, predict_success
+from apo_bench.trial.predicted_success import PossibleTruth, abstain, draw_truths, predict_success
 from apo_bench.trial.predicted_success_table import RATES, SCORES
 from apo_bench.trial.robot_draws import brought
 from apo_bench.trial.run import noise_of
@@ -178,12 +178,12 @@ def test_where_nothing_was_seen_nobody_knows_which_way_all_of_it_is_turned() -> 
 
 
 def test_truths_are_drawn_where_contacts_hold(scene: Scene, simulated: SimulatedDemonstration) -> None:
-    from apo_bench.assembly import largest_gap
+    from apo_bench.assembly import measure_largest_gap
 
     seen = observe_demonstration(simulated, noise_of(asked(noise_mm=0.1, noise_deg=0.1), scene, simulated), SEED)
     correction = correct(seen, "contact")
-    truths = draw_truths(Explanation(1.0, seen, correction.poses), 8, np.random.default_rng(0))
-    gaps = [largest_gap(seen.assembly, seen.start, goals) for goals in truths]
+    truths = draw_truths(PossibleTruth(1.0, seen, correction.poses), 8, np.random.default_rng(0))
+    gaps = [measure_largest_gap(seen.assembly, seen.start, goals) for goals in truths]
     moved = np.abs(truths - correction.poses).max(axis=(1, 2, 3))
     assert max(gaps) < 1e-4 < max(moved)
 

@@ -20,9 +20,9 @@ from apo_bench import (
     load_scenario,
     run_trial,
 )
-from apo_bench.assembly import Consistency, Suspect, Try, relation_graph
+from apo_bench.assembly import Consistency, FreeingTrial, Suspect, build_relation_graph
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, noise_pair, outcomes
+from apo_bench.records import ENV_ID, RECORD_FIELDS, RECORD_SCHEMA, outcomes, parse_noise_level
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.trial import stages
@@ -51,7 +51,7 @@ def rows(scene: Scene, shown: SimulatedDemonstration) -> dict[str, dict[str, Any
 
 def refuses(seen: Observation) -> Correction:
     """A corrector that never converges."""
-    tried = (Try(2, (2,), float("inf")),)
+    tried = (FreeingTrial(2, (2,), float("inf")),)
     return Correction(seen.poses, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
 
 
@@ -104,7 +104,7 @@ def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None
 
 def doubts(seen: Observation) -> Correction:
     """As the paper corrects, with a test that fails and names the first relation."""
-    arcs = relation_graph(seen.assembly).arcs
+    arcs = build_relation_graph(seen.assembly).arcs
     suspects = tuple(Suspect(a.name, a.contacts, a.made, 1.0, 3, 0.8 if a is arcs[0] else 0.0) for a in arcs)
     test = Consistency(30.0, 5, 1e-5, 0.01, suspects)
     return replace(correct(seen, "paper"), test=test, dropped=("R1",))
@@ -255,9 +255,9 @@ def test_a_specification_is_checked_at_the_door(changes: dict[str, Any], words: 
 
 
 def test_a_noise_level_is_one_number_or_two_and_one_of_a_ray() -> None:
-    assert noise_pair(2) == (2.0, 2.0)
-    assert noise_pair([1.0, 0.5]) == (1.0, 0.5)
-    assert noise_pair(2, "depth-camera") == (2.0, 0.0)
+    assert parse_noise_level(2) == (2.0, 2.0)
+    assert parse_noise_level([1.0, 0.5]) == (1.0, 0.5)
+    assert parse_noise_level(2, "depth-camera") == (2.0, 0.0)
     for wrong, said in (
         ([1.0, 2.0, 3.0], "a pair of mm and degrees"),
         ([], "a pair"),
@@ -265,9 +265,9 @@ def test_a_noise_level_is_one_number_or_two_and_one_of_a_ray() -> None:
         (None, "got"),
     ):
         with pytest.raises(InputError, match=f"noise level must be .*{said}"):
-            noise_pair(wrong)  # type: ignore[arg-type]
+            parse_noise_level(wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="noise level must be one number, mm per ray"):
-        noise_pair((1.0, 2.0), "depth-camera")
+        parse_noise_level((1.0, 2.0), "depth-camera")
 
 
 @pytest.mark.parametrize("contact_source", ["detected-jointly:3", "false-negative:"])

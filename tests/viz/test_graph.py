@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.assembly import Graph, relation_graph
+from apo_bench.assembly import Graph, build_relation_graph
 from apo_bench.viz.graph_picture import draw_graph, place_nodes
 from apo_bench.viz.graph_text import graph_form, graph_lines, mermaid_text
 from tests import rounds, scenes
@@ -16,7 +16,7 @@ SOME = [None, *([2e-3] * 8)]
 
 
 def graph_of(name: str, step: int | None = None) -> Graph:
-    return relation_graph(scenes.ALL[name]().assembly, step)
+    return build_relation_graph(scenes.ALL[name]().assembly, step)
 
 
 @pytest.mark.parametrize("name", scenes.ALL)
@@ -52,7 +52,7 @@ def test_words_dashes_and_colours_are_in_the_picture(tmp_path: Path, monkeypatch
         assert words in text
     assert text.lower().count("#c8102e") >= 16
     draw_graph(graph_of("stick_in_tower"), tmp_path / "b.svg", "whole", colors={})
-    draw_graph(relation_graph(rounds.through().assembly), tmp_path / "c.svg", "axial", colors={})
+    draw_graph(build_relation_graph(rounds.through().assembly), tmp_path / "c.svg", "axial", colors={})
     dashes = [(tmp_path / f"{name}.svg").read_text().count("stroke-dasharray") for name in "abc"]
     assert dashes[0] >= 3
     assert dashes[1] == 0

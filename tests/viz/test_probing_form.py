@@ -12,13 +12,13 @@ import pytest
 from apo_bench import InputError, Plan, Scene, build_scene, load_scenario
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.scenario.layout import place_layout
+from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
 from apo_bench.simulation.execution.probing.lay_flat import averaged_s
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
-from apo_bench.simulation.robot.by_wrist import wrist_of
+from apo_bench.simulation.robot.by_wrist import get_wrist
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.viz.probing_form import probing_form
 from tests.viz.test_robot_form import BASE, TOOL, matrix
@@ -35,7 +35,7 @@ def scene(name: str) -> Scene:
 
 @cache
 def plan(name: str) -> Plan:
-    layout = layout_at(load_scenario(name), 0.1, 0.0, 0.3)
+    layout = place_layout(load_scenario(name), 0.1, 0.0, 0.3)
     return Plan(scene(name).scenario.assembly, layout.start, layout.poses)
 
 
@@ -85,7 +85,7 @@ def test_only_what_has_walls_to_fit_into_is_touched_from_the_side() -> None:
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
     for one, (step, t) in zip(
-        form(name, frames)["steps"], moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
+        form(name, frames)["steps"], plan_moves(plan(name), scene(name), True, PROBING_ACTIONS), strict=True
     ):
         assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
         for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):
@@ -112,14 +112,14 @@ def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
 def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor_that_cannot_tell() -> None:
     def averaged(name: str, sensor: str) -> list[float | None]:
         laid = [one["lay_flat"] for one in form(name, sensor=sensor)["steps"]]
-        flat = [move.transfer.flat for move in moves(plan(name), scene(name), True, PROBING_ACTIONS)]
+        flat = [move.transfer.flat for move in plan_moves(plan(name), scene(name), True, PROBING_ACTIONS)]
         return [each and each["averaged_over_s"] for each, f in zip(laid, flat, strict=True) if f is not None]
 
     for sensor, felt in (("wrist", 0.1), ("joint-torque", 3.5)):
-        sigma = wrist_of(
+        sigma = get_wrist(
             Robot(scene("stick_in_tower"), plan("stick_in_tower").start), sensor, np.random.default_rng(0)
         ).sigma
-        flush = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, PROBING_ACTIONS)[-1].transfer.flat
+        flush = plan_moves(plan("stick_in_tower"), scene("stick_in_tower"), True, PROBING_ACTIONS)[-1].transfer.flat
         assert sigma[0] < felt
         assert averaged("stick_in_tower", sensor) == [pytest.approx(averaged_s(flush, sigma), abs=1e-6)]
     assert averaged("peg_in_hole", "joint-torque") == [None]

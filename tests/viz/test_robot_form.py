@@ -12,7 +12,7 @@ from apo_bench import Plan, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from apo_bench.viz.plan_text import plan_lines
 from apo_bench.viz.robot_form import robot_form, tip_in_part
 
@@ -22,7 +22,7 @@ TOOL = pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
 
 def form(name: str, frames: RobotFrames) -> dict[str, Any]:
     scenario = load_scenario(name)
-    layout = layout_at(scenario, 0.1, 0.0, 0.3)
+    layout = place_layout(scenario, 0.1, 0.0, 0.3)
     plan = Plan(scenario.assembly, layout.start, layout.poses)
     return robot_form(plan_lines(plan, scenario), plan, scenario, frames)
 
@@ -43,7 +43,7 @@ def numbers(said: Any) -> list[float | str]:
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pocket_table"])
 def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) -> None:
-    goals = layout_at(load_scenario(name), 0.1, 0.0, 0.3).poses
+    goals = place_layout(load_scenario(name), 0.1, 0.0, 0.3).poses
     for step, goal in zip(form(name, RobotFrames())["steps"], goals, strict=True):
         grip = matrix(step["grasp"]["tip_in_part"])
         assert np.allclose(matrix(step["motions"][-1]["to"]), goal @ grip, atol=1e-9)
@@ -85,7 +85,7 @@ def test_the_tip_looks_down_and_closes_along_the_grasp() -> None:
 def test_a_part_that_is_taken_out_again_leaves_its_contacts_one_after_the_other() -> None:
     """The wedge under the roof comes out in two motions: the second begins where the first one ended."""
     scenario = load_scenario("wedge_under_roof")
-    layout = layout_at(scenario, 0.1, 0.0, 0.3)
+    layout = place_layout(scenario, 0.1, 0.0, 0.3)
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1))
     plan = Plan(scenario.assembly, layout.start, layout.poses, schedule)
     lines = plan_lines(plan, scenario)

@@ -17,9 +17,9 @@ from apo_bench import Scene, SweepConfig, run_sweep
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.shapes import shapes_of, surface
-from apo_bench.simulation.film.track import part_poses
+from apo_bench.simulation.film.track import read_part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene.world import make_initial_state
 from apo_bench.trial.rollout import AS_CORRECTED, AS_SEEN, AS_TRUE, Rollout, scenario_story
 from apo_bench.viz.stepping import FACES, Cursor
 from apo_bench.viz.trial_again import repeat_trial
@@ -46,7 +46,7 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
     last = cursor.snapshot()
     assert set(last.faces) == {of for contact in assembly.operations[2].contacts for of in contact}
     assert last.words[0].endswith("operation 3 of 3, stick: in place")
-    poses = part_poses(last.segment, last.moment)
+    poses = read_part_poses(last.segment, last.moment)
     for part, T in cursor.rollout.assembled.items():
         np.testing.assert_allclose(poses[part], T, atol=1e-9)
     cursor.press("previous operation")
@@ -88,7 +88,7 @@ def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> 
     assert cursor.words()[-2:] == ("orange: as seen", "violet: true")
     shifts = [seen.poses[part][:3, 3] - true.poses[part][:3, 3] for part in seen.poses]
     np.testing.assert_allclose(shifts, [(0.01, 0.0, 0.0)] * 2, atol=1e-12)
-    shapes = list(shapes_of(tower, initial_state(tower.work, cursor.segment.start), cursor.snapshot()))
+    shapes = list(shapes_of(tower, make_initial_state(tower.work, cursor.segment.start), cursor.snapshot()))
     labels = [kind.label for kind, _ in shapes if kind.label]
     assert labels == [str(face) for face in cursor.snapshot().faces]
     names = [tower.work.free.index("castle1"), tower.work.free.index("castle2")]
@@ -100,9 +100,9 @@ def test_shapes_are_as_large_as_what_they_stand_for_and_where_it_is(tower: Scene
     """The castles and the stick at the end: the corners of all their shapes are those of their solids."""
     cursor = Cursor(scenario_story(tower))
     cursor.go(3)
-    poses = part_poses(cursor.segment, cursor.moment)
+    poses = read_part_poses(cursor.segment, cursor.moment)
     points = []
-    for kind, at in shapes_of(tower, initial_state(tower.work, cursor.segment.start), cursor.snapshot()):
+    for kind, at in shapes_of(tower, make_initial_state(tower.work, cursor.segment.start), cursor.snapshot()):
         color = next((part for part, rgb in tower.scenario.colors.items() if np.allclose(kind.rgba[:3], rgb)), None)
         if color in tower.work.free and not kind.label:
             points.append(pose.apply(pose.unpack(at), surface(tower.work.model, kind).vertices))
@@ -177,7 +177,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
         name: row[name] for name in ("success", "worst_gap_mm")
     }
     assert set(rollout.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
-    reached = part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
+    reached = read_part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():
         np.testing.assert_allclose(1e3 * reached[part][:3, 3], packed[:3], atol=0.01)

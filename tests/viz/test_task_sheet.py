@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from apo_bench import load_scenario
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from apo_bench.viz.task_sheet import task_sheet
 from benchmarks.baselines import describe, describe_nominal, read_counts
 from docs.task_sheets import page
@@ -65,7 +65,7 @@ def test_every_scenario_says_all_of_it(name: str) -> None:
 
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
-    scenarios = [load_scenario(name) for name in scenario_names()]
+    scenarios = [load_scenario(name) for name in list_scenario_names()]
     measured = {scenario.name: describe(scenario, read_counts()) for scenario in scenarios}
     assert PAGE.read_text(encoding="utf-8") == page(scenarios, measured), "run: python docs/task_sheets.py"
     assert describe_nominal(scenarios, read_counts()) in JUDGE.read_text(encoding="utf-8"), (

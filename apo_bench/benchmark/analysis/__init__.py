@@ -1,37 +1,52 @@
 """Rates, paired comparisons, curves: numbers out of trial records."""
 
-from apo_bench.benchmark.analysis.calibration import calibrations
+from apo_bench.benchmark.analysis.calibration import tabulate_calibration
 from apo_bench.benchmark.analysis.condition import (
     CONDITION_FIELDS,
     Condition,
-    by_condition,
-    condition_of,
-    noise_label,
-    order,
-    rank,
+    format_noise_label,
+    get_condition,
+    group_by_condition,
+    make_sort_key,
+    rank_method,
 )
-from apo_bench.benchmark.analysis.detection import detections
-from apo_bench.benchmark.analysis.effort import efforts
-from apo_bench.benchmark.analysis.gaps import gaps
+from apo_bench.benchmark.analysis.detection import tabulate_detection
+from apo_bench.benchmark.analysis.effort import tabulate_effort
+from apo_bench.benchmark.analysis.gaps import tabulate_gaps
 from apo_bench.benchmark.analysis.half_level import HalfLevel
 from apo_bench.benchmark.analysis.line import ALL, Line
 from apo_bench.benchmark.analysis.over_seeds import (
     FEWEST_SEEDS,
     Contrast,
     Results,
+    compute_mean_surprise,
+    compute_threshold,
     contrast,
-    mean_surprise,
-    pooled_rate,
-    threshold,
+    pool_rate,
 )
-from apo_bench.benchmark.analysis.paired import Paired, tango
-from apo_bench.benchmark.analysis.prediction import confusions
-from apo_bench.benchmark.analysis.probing import probing_results
-from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, ConditionResult, Interval, Rate, Records, tally, wilson
-from apo_bench.benchmark.analysis.settings import level_of, level_unit, levels_of, members, noise_words, settings
-from apo_bench.benchmark.analysis.summary import Summary, summary
-from apo_bench.benchmark.analysis.timing import read_timing, trial_times, work
-from apo_bench.benchmark.analysis.words import percent, percents, points, signed
+from apo_bench.benchmark.analysis.paired import PairedComparison, compute_tango_interval
+from apo_bench.benchmark.analysis.prediction import tabulate_confusion
+from apo_bench.benchmark.analysis.probing import tabulate_probing
+from apo_bench.benchmark.analysis.rates import (
+    NOT_EXECUTED,
+    ConditionResult,
+    Interval,
+    Rate,
+    Records,
+    compute_wilson_interval,
+    tally,
+)
+from apo_bench.benchmark.analysis.settings import (
+    format_noise,
+    get_level,
+    get_level_unit,
+    group_by_setting,
+    list_levels,
+    list_settings,
+)
+from apo_bench.benchmark.analysis.summary import Summary, summarise
+from apo_bench.benchmark.analysis.timing import read_timing, tabulate_trial_times, tabulate_work
+from apo_bench.benchmark.analysis.words import format_percent, format_percent_interval, format_points, format_signed
 
 __all__ = (
     "ALL",
@@ -44,41 +59,41 @@ __all__ = (
     "HalfLevel",
     "Interval",
     "Line",
-    "Paired",
+    "PairedComparison",
     "Rate",
     "Records",
     "Results",
     "Summary",
-    "by_condition",
-    "calibrations",
-    "condition_of",
-    "confusions",
+    "compute_mean_surprise",
+    "compute_tango_interval",
+    "compute_threshold",
+    "compute_wilson_interval",
     "contrast",
-    "detections",
-    "efforts",
-    "gaps",
-    "level_of",
-    "level_unit",
-    "levels_of",
-    "mean_surprise",
-    "members",
-    "noise_label",
-    "noise_words",
-    "order",
-    "percent",
-    "percents",
-    "points",
-    "pooled_rate",
-    "probing_results",
-    "rank",
+    "format_noise",
+    "format_noise_label",
+    "format_percent",
+    "format_percent_interval",
+    "format_points",
+    "format_signed",
+    "get_condition",
+    "get_level",
+    "get_level_unit",
+    "group_by_condition",
+    "group_by_setting",
+    "list_levels",
+    "list_settings",
+    "make_sort_key",
+    "pool_rate",
+    "rank_method",
     "read_timing",
-    "settings",
-    "signed",
-    "summary",
+    "summarise",
+    "tabulate_calibration",
+    "tabulate_confusion",
+    "tabulate_detection",
+    "tabulate_effort",
+    "tabulate_gaps",
+    "tabulate_probing",
+    "tabulate_trial_times",
+    "tabulate_work",
     "tally",
-    "tango",
-    "threshold",
-    "trial_times",
-    "wilson",
-    "work",
 )

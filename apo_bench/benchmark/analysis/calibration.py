@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import rank, rank_contact_source
+from apo_bench.benchmark.analysis.condition import rank_contact_source, rank_method
 from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
 from apo_bench.records import knows_truth
@@ -13,7 +13,7 @@ from apo_bench.records.run.trials import Trials, trials_of
 _AXES = ("scenario", "noise", "contact_source", "method")
 
 
-def calibrations(records: Records) -> list[Line]:
+def tabulate_calibration(records: Records) -> list[Line]:
     """One line per scenario, noise, contact source and method but the oracle.
 
     Over every noise level, human error scale and clearance: how often the truth lies in the stated region, the errors
@@ -28,7 +28,7 @@ def calibrations(records: Records) -> list[Line]:
 
 def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
     scenario, noise, contact_source, method = key
-    return scenario, noise, rank_contact_source(contact_source), rank(method), method
+    return scenario, noise, rank_contact_source(contact_source), rank_method(method), method
 
 
 def _line(axes: Line, trials: Trials) -> Line:

@@ -75,7 +75,7 @@ class Condition(_Others):  # type: ignore[misc]  # made from the settings, so th
     @property
     def noise_words(self) -> str:
         """`0.5`, or `0.5 mm, 1 deg`; `any` of the oracle, which noise does not affect."""
-        return "any" if knows_truth(self.method) else noise_label(self.noise_mm, self.noise_deg, self.noise)
+        return "any" if knows_truth(self.method) else format_noise_label(self.noise_mm, self.noise_deg, self.noise)
 
     @property
     def words(self) -> Mapping[str, Any]:
@@ -106,14 +106,14 @@ CONDITION_FIELDS = (*_OWN, *_OTHERS)
 """Columns of a trial record, too."""
 
 
-def noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> str:
+def format_noise_label(noise_mm: float, noise_deg: float, noise: str = "") -> str:
     """`0.5`, `0.5 mm, 1 deg` where the two differ, or `0.5 mm per ray` of the depth camera."""
     if noise == DEPTH_CAMERA:
         return f"{noise_mm:g} mm per ray"
     return f"{noise_mm:g}" if noise_mm == noise_deg else f"{noise_mm:g} mm, {noise_deg:g} deg"
 
 
-def rank(method: str) -> int:
+def rank_method(method: str) -> int:
     """The position of a method in a table; one with `+spiral` or `+probe` ranks like the method."""
     plain = method if method in _FIRST else parse_method(method).corrector
     return _FIRST.index(plain) if plain in _FIRST else len(_FIRST)
@@ -124,24 +124,24 @@ def rank_contact_source(contact_source: str) -> tuple[int, str]:
     return int(contact_source != "given"), contact_source
 
 
-def order(c: Condition) -> tuple[Any, ...]:
+def make_sort_key(c: Condition) -> tuple[Any, ...]:
     """How conditions are sorted: by setting, with defaults first, then by method (`oracle` first), then by noise."""
     others = ((getattr(c, name) != SETTINGS[name].default, getattr(c, name)) for name in _OTHERS)
     noise = (c.noise != USUAL, c.noise, rank_contact_source(c.contact_source))
     return (
         *(c.scenario, c.clearance_mm, noise, c.human_error_scale, *others),
-        *(rank(c.method), c.method, c.noise_mm, c.noise_deg),
+        *(rank_method(c.method), c.method, c.noise_mm, c.noise_deg),
     )
 
 
-def condition_of(record: Mapping[str, Any]) -> Condition | None:
+def get_condition(record: Mapping[str, Any]) -> Condition | None:
     """The condition of a record; None for an observation from a file, which has no noise level."""
     if record["noise_mm"] is None:
         return None
     return Condition(**{name: record[name] for name in CONDITION_FIELDS if name in record})
 
 
-def by_condition(trials: Trials) -> dict[Condition, Trials]:
+def group_by_condition(trials: Trials) -> dict[Condition, Trials]:
     """The trials of every condition, in the order of their seeds, without observations from files.
 
     Raises:
@@ -160,10 +160,10 @@ def by_condition(trials: Trials) -> dict[Condition, Trials]:
                 f"the records hold a trial twice ({condition.scenario}, {condition.method}, noise "
                 f"{condition.noise_mm:g}, seed {twice[0]:.0f}); every trial counts once, so leave one of the two out."
             )
-    return {condition: found[condition] for condition in sorted(found, key=order)}
+    return {condition: found[condition] for condition in sorted(found, key=make_sort_key)}
 
 
 def by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
     """Scenario and method -> trials, sorted as conditions are."""
     groups = trials.parts(("scenario", "method"))
-    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}
+    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank_method(key[1]), key[1]))}

@@ -12,7 +12,7 @@ from apo_bench.records.run.trials import Trials, trials_of
 _AXES = ("scenario", "noise", "pose_source", "contact_source", "human_error_scale", "noise_mm", "noise_deg")
 
 
-def detections(records: Records) -> list[Line]:
+def tabulate_detection(records: Records) -> list[Line]:
     """One line per scenario, noise, pose and contact source, human error scale and noise level; and over all scenarios.
 
     Methods of one seed get the same contacts, so each observation counts once. A demonstration is complete if exactly

@@ -8,7 +8,7 @@ from apo_bench.benchmark.analysis.rates import Records
 from apo_bench.records.run.trials import trials_of
 
 
-def efforts(records: Records) -> list[Line]:
+def tabulate_effort(records: Records) -> list[Line]:
     """One line per scenario and method: means over its successes, at every noise level and human error scale."""
     trials = trials_of(records)
     right = trials.where(trials.number("success") == 1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import by_condition
+from apo_bench.benchmark.analysis.condition import group_by_condition
 from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Records
 from apo_bench.records import uses_contacts
@@ -12,12 +12,12 @@ _PERCENTILES = {"5": 5.0, "median_mm": 50.0, "95": 95.0}
 _COLUMNS = {"observed": "gap_before_mm", "planned": "gap_after_mm"}
 
 
-def gaps(records: Records) -> list[Line]:
+def tabulate_gaps(records: Records) -> list[Line]:
     """One line per condition of a method that corrects, of its trials with a plan, sorted as `tally` sorts; [mm]."""
     trials = trials_of(records)
     known = ~np.isnan(trials.number("gap_before_mm")) & ~np.isnan(trials.number("gap_after_mm"))
     lines = []
-    for condition, own in by_condition(trials.where(known & trials.holds("method", uses_contacts))).items():
+    for condition, own in group_by_condition(trials.where(known & trials.holds("method", uses_contacts))).items():
         line: Line = {"condition": condition, "trials": len(own)}
         for kind, column in _COLUMNS.items():
             values = np.percentile(own.number(column), list(_PERCENTILES.values())).tolist()

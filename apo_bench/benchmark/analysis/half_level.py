@@ -17,7 +17,7 @@ import numpy as np
 from apo_bench.benchmark.analysis.condition import Condition
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, ConditionResult
 from apo_bench.geometry import Array
-from apo_bench.io import grouped
+from apo_bench.io import group_by
 from apo_bench.records import DEPTH_CAMERA, knows_truth
 
 
@@ -63,7 +63,7 @@ def half_levels(cells: Iterable[ConditionResult]) -> tuple[HalfLevel, ...]:
 
     Where poses are drawn a level is as many degrees as mm; cells with another pair of the two are on no curve.
     """
-    curves = grouped((c.curve, c) for c in cells if c.trials and _is_usual(c) and not knows_truth(c.method))
+    curves = group_by((c.curve, c) for c in cells if c.trials and _is_usual(c) and not knows_truth(c.method))
     return tuple(half_level(condition, own) for condition, own in curves.items() if len(own) > 1)
 
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.paired import mcnemar, tango
-from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, wilson
+from apo_bench.benchmark.analysis.paired import compute_tango_interval, mcnemar
+from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, compute_wilson_interval
 from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Index
 
@@ -78,12 +78,12 @@ class Contrast(NamedTuple):
         return differ and not self.interval.low <= 0.0 <= self.interval.high
 
 
-def pooled_rate(results: Results) -> PooledRate:
+def pool_rate(results: Results) -> PooledRate:
     """The rate of one method over all its trials, of which there is one at least."""
     values, most = _by_seed(results.seed, results.success)
     right = int(results.success.sum())
     trials = len(results.seed)
-    low, high = wilson(right, trials) if len(values) == trials else mean_interval(values, 0.0, most)
+    low, high = compute_wilson_interval(right, trials) if len(values) == trials else mean_interval(values, 0.0, most)
     return PooledRate(right, trials, len(values), Interval(low, min(1.0, high)))
 
 
@@ -97,7 +97,7 @@ def contrast(first: Results, second: Results) -> Contrast | None:
     apart = ours - theirs
     values, most = _by_seed(first.seed[i], apart)
     if len(values) == len(apart):
-        interval = tango(int((apart > 0).sum()), int((apart < 0).sum()), len(apart))
+        interval = compute_tango_interval(int((apart > 0).sum()), int((apart < 0).sum()), len(apart))
     else:
         # a seed that was not seen may differ in all of its trials
         interval = Interval(*np.clip(mean_interval(values, -most, most), -1.0, 1.0).tolist())
@@ -112,14 +112,14 @@ def contrast(first: Results, second: Results) -> Contrast | None:
     )
 
 
-def threshold(seeds: int) -> float:
+def compute_threshold(seeds: int) -> float:
     """What twice the log likelihood ratio stays below in 95 of 100 samples; infinite with a single seed or none."""
     from scipy.special import fdtri
 
     return float(fdtri(1, seeds - 1, CONFIDENCE)) if seeds > 1 else float("inf")
 
 
-def mean_surprise(values: Array, counts: Array, mean: float, low: float = 0.0, high: float = 1.0) -> float:
+def compute_mean_surprise(values: Array, counts: Array, mean: float, low: float = 0.0, high: float = 1.0) -> float:
     """Twice the log likelihood ratio of a mean, 0 at the mean of the sample.
 
     The likeliest weights are n_i / (n (1 + a (x_i - mean))); what they leave over lies on a bound. Twice the log ratio
@@ -163,12 +163,12 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     """Where between the mean of the sample and a bound the surprise reaches its threshold."""
     from scipy.optimize import brentq
 
-    most = threshold(int(counts.sum()))
+    most = compute_threshold(int(counts.sum()))
     edge = _EDGE * (outside - inside)
-    if edge == 0.0 or mean_surprise(values, counts, outside - edge, low, high) <= most:
+    if edge == 0.0 or compute_mean_surprise(values, counts, outside - edge, low, high) <= most:
         return outside
     ends = inside + edge, outside - edge
-    return float(brentq(lambda mean: mean_surprise(values, counts, mean, low, high) - most, *ends, xtol=1e-9))
+    return float(brentq(lambda mean: compute_mean_surprise(values, counts, mean, low, high) - most, *ends, xtol=1e-9))
 
 
 def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:

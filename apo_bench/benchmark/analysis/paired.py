@@ -7,7 +7,7 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import Condition, by_condition
+from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
 from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, mean
 from apo_bench.geometry import Array
 from apo_bench.records import TrialConfig, affects, knows_truth
@@ -22,7 +22,7 @@ _EDGE = 1e-9
 
 @final
 @dataclass(frozen=True)
-class Paired:
+class PairedComparison:
     """A method against another one, in one condition."""
 
     condition: Condition
@@ -54,7 +54,7 @@ class Paired:
     @property
     def interval(self) -> Interval:
         """Tango's 95 % interval of the difference."""
-        return tango(self.only_method, self.only_reference, self.pairs)
+        return compute_tango_interval(self.only_method, self.only_reference, self.pairs)
 
     @property
     def neither(self) -> int:
@@ -72,7 +72,7 @@ class Paired:
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
-def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[PairedComparison, ...]:
     """Every method but the oracle against every reference, condition by condition, sorted as `tally` sorts.
 
     A setting that does not affect the reference has its default there, so one reference serves several conditions.
@@ -81,7 +81,7 @@ def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Pa
     Raises:
         InputError: A trial is there twice.
     """
-    conditions = by_condition(trials_of(records)).items()
+    conditions = group_by_condition(trials_of(records)).items()
     counted = {condition: own.where(~np.isnan(own.number("success"))) for condition, own in conditions}
     cells = {condition: own for condition, own in counted.items() if len(own)}
     pairs = [
@@ -115,7 +115,7 @@ def reference_condition(condition: Condition, reference: str) -> Condition:
     return replace(condition, method=reference, **usual)
 
 
-def _comparison(pair: Paired) -> frozenset[Condition]:
+def _comparison(pair: PairedComparison) -> frozenset[Condition]:
     return frozenset((pair.condition, reference_condition(pair.condition, pair.reference)))
 
 
@@ -136,7 +136,7 @@ def mcnemar(only_first: int, only_second: int) -> float:
 
 
 @lru_cache(maxsize=65536)
-def tango(b: int, c: int, n: int) -> Interval:
+def compute_tango_interval(b: int, c: int, n: int) -> Interval:
     """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
 
     The differences at which Tango's score statistic is within the normal quantile; sensible where no pair is
@@ -169,7 +169,7 @@ def _score(b: int, c: int, n: int, delta: float) -> float:
     return float((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
 
 
-def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> Paired:
+def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) -> PairedComparison:
     _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
     ours = ours.where(i)
     theirs = theirs.where(j)
@@ -179,7 +179,7 @@ def _paired(condition: Condition, reference: str, ours: Trials, theirs: Trials) 
     only_reference = int((~right & other_right).sum())
     apart = ours.number("planned_error_free_mm") - theirs.number("planned_error_free_mm")
     apart = apart[~np.isnan(apart)]
-    return Paired(
+    return PairedComparison(
         condition=condition,
         reference=reference,
         pairs=len(right),

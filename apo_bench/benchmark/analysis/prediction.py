@@ -8,7 +8,7 @@ from apo_bench.benchmark.analysis.rates import Rate, Records, was_executed
 from apo_bench.records.run.trials import Trials, trials_of
 
 
-def confusions(records: Records) -> list[Line]:
+def tabulate_confusion(records: Records) -> list[Line]:
     """One line per scenario and method, sorted as `tally` sorts, and one of them all at the end.
 
     Fitted means a success made as demonstrated, which is what a plan predicts. Of the trials that were rightly

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import Condition, by_condition
+from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
 from apo_bench.benchmark.analysis.line import Line
 from apo_bench.benchmark.analysis.rates import Records, root_mean_square
-from apo_bench.records import assumed_error, robot_sigmas
+from apo_bench.records import parse_assumed_error, parse_robot_error
 from apo_bench.records.run.trials import Trials, trials_of
 
 
-def probing_results(records: Records) -> list[Line]:
+def tabulate_probing(records: Records) -> list[Line]:
     """One line per condition of a robot that probed, sorted as `tally` sorts.
 
     Lengths [mm] and angles [deg] are root mean squares of vectors: the error of the base as drawn, as assumed (None if
@@ -19,11 +19,11 @@ def probing_results(records: Records) -> list[Line]:
     """
     trials = trials_of(records)
     own = trials.where(~np.isnan(trials.number("probe_contacts")))
-    return [_line(condition, felt_there) for condition, felt_there in by_condition(own).items()]
+    return [_line(condition, felt_there) for condition, felt_there in group_by_condition(own).items()]
 
 
 def _line(condition: Condition, trials: Trials) -> Line:
-    assumed = assumed_error(condition.assumed_robot_error, condition.robot_error)
+    assumed = parse_assumed_error(condition.assumed_robot_error, condition.robot_error)
     drawn_mm, drawn_deg = _as_vector(condition.robot_error)
     assumed_mm, assumed_deg = (None, None) if assumed is None else _as_vector(assumed)
     return {
@@ -44,5 +44,5 @@ def _line(condition: Condition, trials: Trials) -> Line:
 
 def _as_vector(name: str) -> tuple[float, float]:
     """Root mean squares of vectors of three axes, of the error of the base."""
-    mm, deg = robot_sigmas(name).hand_eye
+    mm, deg = parse_robot_error(name).hand_eye
     return math.sqrt(3.0) * mm, math.sqrt(3.0) * deg

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import Condition, by_condition
+from apo_bench.benchmark.analysis.condition import Condition, group_by_condition
 from apo_bench.geometry import Array
 from apo_bench.records.run.trials import Mask, Trials, trials_of
 
@@ -43,7 +43,7 @@ class Rate(NamedTuple):
     @property
     def interval(self) -> Interval:
         """Wilson's at 95 %."""
-        return wilson(self.successes, self.trials)
+        return compute_wilson_interval(self.successes, self.trials)
 
 
 @final
@@ -80,7 +80,7 @@ class ConditionResult(Condition):
     @property
     def interval(self) -> Interval:
         """Wilson's 95 % interval of the success rate."""
-        return wilson(self.successes, self.trials)
+        return compute_wilson_interval(self.successes, self.trials)
 
     @property
     def tightness(self) -> float | None:
@@ -108,7 +108,7 @@ class ConditionResult(Condition):
 
 
 @lru_cache(maxsize=65536)
-def wilson(successes: int, trials: int) -> Interval:
+def compute_wilson_interval(successes: int, trials: int) -> Interval:
     """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
     from scipy.stats import binomtest
 
@@ -124,7 +124,7 @@ def tally(records: Records) -> tuple[ConditionResult, ...]:
     Raises:
         InputError: A trial is there twice.
     """
-    return tuple(_count(condition, own) for condition, own in by_condition(trials_of(records)).items())
+    return tuple(_count(condition, own) for condition, own in group_by_condition(trials_of(records)).items())
 
 
 def mean(numbers: Array) -> float | None:

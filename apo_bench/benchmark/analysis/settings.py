@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
-from apo_bench.benchmark.analysis.condition import CONDITION_FIELDS, Condition, noise_label, order
-from apo_bench.io import grouped
+from apo_bench.benchmark.analysis.condition import CONDITION_FIELDS, Condition, format_noise_label, make_sort_key
+from apo_bench.io import group_by
 from apo_bench.records import DEPTH_CAMERA, affects, knows_truth
 
 _Item = TypeVar("_Item", bound=Any)
@@ -12,47 +12,47 @@ _Item = TypeVar("_Item", bound=Any)
 _SHARED = tuple(name for name in CONDITION_FIELDS if name not in ("method", "noise_mm", "noise_deg"))
 
 
-def settings(items: Iterable[Any]) -> list[Condition]:
+def list_settings(items: Iterable[Any]) -> list[Condition]:
     """The settings of items with a condition, sorted; a condition adds one only if no other setting holds it."""
     chosen = set[Condition]()
     # methods that most settings affect come first, so that others find the setting that they belong to
-    groups = grouped(
+    groups = group_by(
         (tuple(affects(name, item.condition.method) for name in _SHARED), item.condition) for item in items
     )
     for _, alike in sorted(groups.items(), reverse=True):
-        chosen |= {c.setting for c in alike if not any(holds(other, c) for other in chosen)}
-    return sorted(chosen, key=order)
+        chosen |= {c.setting for c in alike if not any(belongs_to(other, c) for other in chosen)}
+    return sorted(chosen, key=make_sort_key)
 
 
-def members(settings: Sequence[Condition], items: Iterable[_Item]) -> dict[Condition, list[_Item]]:
+def group_by_setting(settings: Sequence[Condition], items: Iterable[_Item]) -> dict[Condition, list[_Item]]:
     """The items of every setting, in their order; of several oracles the one with most trials."""
     items = list(items)
-    return {s: _one_ceiling([item for item in items if holds(s, item.condition)]) for s in settings}
+    return {s: _one_ceiling([item for item in items if belongs_to(s, item.condition)]) for s in settings}
 
 
-def holds(setting: Condition, condition: Condition) -> bool:
+def belongs_to(setting: Condition, condition: Condition) -> bool:
     """Whether a condition belongs to a setting: all agrees that affects its method."""
     return all(
         getattr(setting, name) == getattr(condition, name) or not affects(name, condition.method) for name in _SHARED
     )
 
 
-def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:
+def list_levels(items: Iterable[Any]) -> list[tuple[float, float]]:
     """Noise levels in mm and degrees of all but the oracle, sorted."""
-    return sorted({level_of(item) for item in items if not knows_truth(item.condition.method)})
+    return sorted({get_level(item) for item in items if not knows_truth(item.condition.method)})
 
 
-def level_of(item: Any) -> tuple[float, float]:
+def get_level(item: Any) -> tuple[float, float]:
     """In mm and degrees."""
     return item.condition.noise_mm, item.condition.noise_deg
 
 
-def noise_words(level: tuple[float, float], noise: str) -> str:
+def format_noise(level: tuple[float, float], noise: str) -> str:
     """`0.5`, or `0.5 mm, 1 deg` where they differ."""
-    return f"{level[0]:g}" if noise == DEPTH_CAMERA else noise_label(*level, noise)
+    return f"{level[0]:g}" if noise == DEPTH_CAMERA else format_noise_label(*level, noise)
 
 
-def level_unit(noise: str) -> str:
+def get_level_unit(noise: str) -> str:
     """The unit of a noise level, for an axis."""
     return "noise level: mm per ray" if noise == DEPTH_CAMERA else "noise level: mm and degrees per axis"
 

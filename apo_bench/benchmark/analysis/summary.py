@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from apo_bench.benchmark.analysis.half_level import HalfLevel, half_levels
-from apo_bench.benchmark.analysis.paired import REFERENCES, Paired, paired
+from apo_bench.benchmark.analysis.paired import REFERENCES, PairedComparison, paired
 from apo_bench.benchmark.analysis.rates import ConditionResult, Records, tally
 from apo_bench.records.run.trials import trials_of
 
@@ -13,11 +13,11 @@ class Summary(NamedTuple):
     """Each sorted as `tally` sorts, whatever the order of records."""
 
     results: tuple[ConditionResult, ...]
-    pairs: tuple[Paired, ...]
+    pairs: tuple[PairedComparison, ...]
     half_levels: tuple[HalfLevel, ...]
 
 
-def summary(records: Records, references: Sequence[str] = REFERENCES) -> Summary:
+def summarise(records: Records, references: Sequence[str] = REFERENCES) -> Summary:
     """Rates, pairs and half levels of trials.
 
     Args:

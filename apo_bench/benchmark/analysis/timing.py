@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.analysis.condition import rank
+from apo_bench.benchmark.analysis.condition import rank_method
 from apo_bench.benchmark.analysis.line import Line
-from apo_bench.io import each_line, grouped
+from apo_bench.io import group_by, read_lines
 from apo_bench.records.run.validation import timing_of
 
 _PARTS = ("compile_s", "demonstrate_s", "trial_s")
@@ -24,15 +24,15 @@ def read_timing(folder: Path) -> list[dict[str, Any]]:
     path = folder / "timing.jsonl"
     if not os.path.lexists(path):
         return []
-    lines = [timing_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of timings")]
+    lines = [timing_of(line, f"{path}, line {number}") for number, line in read_lines(path, "table of timings")]
     return [line for line in lines if line["trial_s"] is not None]
 
 
-def trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
+def tabulate_trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
     """One line per scenario and method: percentiles and sum [s] of trials without demonstration and compilation."""
-    times = grouped(((line["scenario"], line["method"]), line["trial_s"]) for line in lines)
+    times = group_by(((line["scenario"], line["method"]), line["trial_s"]) for line in lines)
     made = []
-    for scenario, method in sorted(times, key=lambda key: (key[0], rank(key[1]), key[1])):
+    for scenario, method in sorted(times, key=lambda key: (key[0], rank_method(key[1]), key[1])):
         seconds = np.array(times[scenario, method], dtype=float)
         low, middle, high = np.percentile(seconds, (5, 50, 95)).tolist()
         made.append(
@@ -49,9 +49,9 @@ def trial_times(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
     return made
 
 
-def work(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
+def tabulate_work(lines: Iterable[Mapping[str, Any]]) -> list[Line]:
     """One line per host and worker, with the rate over its busy time."""
-    workers = grouped(
+    workers = group_by(
         ((str(line.get("host")), str(line.get("worker"))), sum(line.get(part) or 0.0 for part in _PARTS))
         for line in lines
     )

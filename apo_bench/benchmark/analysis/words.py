@@ -3,7 +3,7 @@
 from apo_bench.benchmark.analysis.rates import Interval
 
 
-def percent(rate: float | None, digits: int = 1) -> str:
+def format_percent(rate: float | None, digits: int = 1) -> str:
     """`97.0 %`, or a dash where nothing counted; only what is all or nothing says 100.0 or 0.0."""
     if rate is None:
         return "–"
@@ -14,17 +14,17 @@ def percent(rate: float | None, digits: int = 1) -> str:
     return f"< {least:.{digits}f} %" if rate > 0.0 and float(text) == 0.0 else f"{text} %"
 
 
-def percents(interval: Interval, digits: int = 1) -> str:
+def format_percent_interval(interval: Interval, digits: int = 1) -> str:
     """`91.5 to 99.0 %`."""
     return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
 
 
-def signed(x: float, digits: int) -> str:
+def format_signed(x: float, digits: int) -> str:
     """`+4.0`; what is nothing to so many digits has no minus."""
     return f"{round(x, digits) + 0.0:+.{digits}f}"
 
 
-def points(share: float | Interval) -> str:
+def format_points(share: float | Interval) -> str:
     """`+4.0`, or `-0.3 to +9.1`: hundredths of a difference of two rates."""
     ends = share if isinstance(share, tuple) else (share,)
-    return " to ".join(signed(100 * x, 1) for x in ends)
+    return " to ".join(format_signed(100 * x, 1) for x in ends)

@@ -1,5 +1,5 @@
 """Data to learn from: pairs of observation and truth."""
 
-from apo_bench.benchmark.datasets.drawing import Pairs, endless_pairs, pairs
+from apo_bench.benchmark.datasets.drawing import Pairs, draw_endless_pairs, draw_pairs
 
-__all__ = ("Pairs", "endless_pairs", "pairs")
+__all__ = ("Pairs", "draw_endless_pairs", "draw_pairs")

@@ -28,7 +28,7 @@ class Field(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Episode:
+class RecordedEpisode:
     """One episode of T actions."""
 
     seed: int

@@ -19,29 +19,39 @@ from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Ope
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import (
-    Anisotropic,
-    AnyTurn,
-    Bias,
+    AnisotropicNoise,
+    AnyTurnNoise,
+    BiasNoise,
     CameraFailures,
-    Empirical,
-    Fitted,
-    HeavyTailed,
-    Isotropic,
-    Outliers,
-    PerPart,
-    Sighted,
-    Symmetric,
+    CameraNoise,
+    EmpiricalNoise,
+    FittedNoise,
+    HeavyTailedNoise,
+    IsotropicNoise,
+    OutlierNoise,
+    PerPartNoise,
+    SymmetricNoise,
 )
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.records import USUAL, TrialConfig, check, noise_pair
-from apo_bench.scenario import Scenario, human_error_covariance, load_scenario, spread_error
+from apo_bench.records import USUAL, TrialConfig, check, parse_noise_level
+from apo_bench.scenario import Scenario, compute_human_error_covariance, load_scenario, spread_error
 from apo_bench.scenario.layout import Layouts, draw_layouts
 
 _BY_PART = frozenset(
     (
-        *(Isotropic, Anisotropic, PerPart, Sighted, HeavyTailed, Outliers, Bias, Symmetric, AnyTurn),
-        *(Empirical, Fitted),
+        *(
+            IsotropicNoise,
+            AnisotropicNoise,
+            PerPartNoise,
+            CameraNoise,
+            HeavyTailedNoise,
+            OutlierNoise,
+            BiasNoise,
+            SymmetricNoise,
+            AnyTurnNoise,
+        ),
+        *(EmpiricalNoise, FittedNoise),
     )
 )
 """Models whose errors of operations on different parts are independent, whatever else is seen."""
@@ -161,7 +171,7 @@ _ARRAYS = tuple(field.name for field in fields(Pairs))[:6]
 
 
 @check_arguments
-def pairs(
+def draw_pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,
     n: int = 1000,
@@ -173,7 +183,7 @@ def pairs(
     """Pairs of observation and truth; of several scenarios in turn.
 
     No physics: a part is shown exactly where the hand puts it, with the human's carelessness. The pairs are those that
-    `endless_pairs` begins with, so more of them begin with the same ones.
+    `draw_endless_pairs` begins with, so more of them begin with the same ones.
 
     Args:
         scenarios: Names, files or objects, one or several.
@@ -188,7 +198,9 @@ def pairs(
     """
     require(1 <= n <= _MOST, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
     blocks = list[Pairs]()
-    for block in endless_pairs(scenarios, noise, seed, noise_level=noise_level, human_error_scale=human_error_scale):
+    for block in draw_endless_pairs(
+        scenarios, noise, seed, noise_level=noise_level, human_error_scale=human_error_scale
+    ):
         blocks.append(block)
         if sum(map(len, blocks)) >= n:
             break
@@ -197,7 +209,7 @@ def pairs(
 
 
 @check_arguments
-def endless_pairs(
+def draw_endless_pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,
     seed: int = 0,
@@ -205,13 +217,13 @@ def endless_pairs(
     noise_level: float | Sequence[float] = 1.0,
     human_error_scale: float = TrialConfig.human_error_scale,
 ) -> Iterator[Pairs]:
-    """Pairs without end, `BLOCK` of each scenario at a time, in turn; arguments are those of `pairs`."""
+    """Pairs without end, `BLOCK` of each scenario at a time, in turn; arguments are those of `draw_pairs`."""
     several: Any = scenarios if isinstance(scenarios, Iterable) and not isinstance(scenarios, str) else [scenarios]
     given = [*several]
     require(given, "no scenario was given; give one or more.")
     check("seed", seed)
     check("human_error_scale", human_error_scale)
-    model = make_noise(noise, NoiseLevel(*noise_pair(noise_level)))
+    model = make_noise(noise, NoiseLevel(*parse_noise_level(noise_level)))
     loaded = [load_scenario(each) for each in given]
     return (_block(loaded, model, seed, number, human_error_scale) for number in count())
 
@@ -224,10 +236,12 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     covariance = np.tile(np.eye(6), (n, k, 1, 1))
     there = np.zeros((n, k), dtype=np.bool_)
     for i, scenario in enumerate(scenarios):
-        rng = stream(seed, scenario.name, number)
+        rng = seed_block(seed, scenario.name, number)
         layouts = draw_layouts(scenario, rng, BLOCK)
         shown = Layouts(layouts.goals @ _mistakes(scenario, human_error_scale, rng), layouts.start)
-        seen = observe_many(scenario.assembly, shown, human_error_covariance(scenario, human_error_scale), noise, rng)
+        seen = observe_many(
+            scenario.assembly, shown, compute_human_error_covariance(scenario, human_error_scale), noise, rng
+        )
         rows = slice(i, None, m), slice(len(scenario.assembly))
         truth[rows] = layouts.goals
         goals[rows], covariance[rows], there[rows] = seen
@@ -237,7 +251,7 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     return Pairs(goals, covariance, there, truth, sizes[turn], turn, names, by_part(noise))
 
 
-def stream(seed: int, scenario: str, number: int) -> np.random.Generator:
+def seed_block(seed: int, scenario: str, number: int) -> np.random.Generator:
     """The random numbers of one block of a scenario of this name."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Episode, Field, write_card
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, write_card
 from apo_bench.geometry import Array, pose
 from apo_bench.io import write_columns
 from apo_bench.records import TrialConfig, TrialRecord
 from apo_bench.simulation.hooks import Hooks, Phase
-from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_sensors_on
+from apo_bench.simulation.scene import WRIST_SENSORS, Scene, get_part_pose, switch_wrist_sensors_on
 from apo_bench.trial.run import noise_of, run_trial
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 
@@ -120,7 +120,7 @@ class _Recorder:
         self.plan = plan
 
     def _tick(self, data: Any, phase: Phase) -> None:
-        at = [part_pose(self._scene.work, data, part) for part in self.parts]
+        at = [get_part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
             float(data.time),
             None if phase.operation is None else phase.operation + 1,
@@ -173,7 +173,7 @@ def replays(trials: Iterable[TrialConfig], scenes: Mapping[str, Scene]) -> Itera
         simulated = simulate_demonstration(
             scene, settings.human_error_scale, settings.seed, settings.pose_source, settings.secret_seed
         )
-        with wrist_sensors_on(scene.work.model):
+        with switch_wrist_sensors_on(scene.work.model):
             row = run_trial(settings, scene, simulated=simulated, watch=recorder.hooks())
         yield Replay(scene, _episode(settings, scene, simulated, row, recorder), recorder.frames())
 
@@ -235,7 +235,9 @@ def about_replays(found: Sequence[Scene], command: str, robot: str) -> DatasetMe
     )
 
 
-def replay_rollouts(found: Iterable[Replay], about: DatasetMetadata, say: Callable[[str], None]) -> Iterator[Episode]:
+def replay_rollouts(
+    found: Iterable[Replay], about: DatasetMetadata, say: Callable[[str], None]
+) -> Iterator[RecordedEpisode]:
     """Replays as episodes, but for those of which nothing was carried out."""
     width = len(about.fields["environment_state"].names)
     for scene, episode, frames in found:
@@ -249,7 +251,7 @@ def replay_rollouts(found: Iterable[Replay], about: DatasetMetadata, say: Callab
         ]
         rewards = np.zeros(n)
         rewards[-1] = float(episode["success"])
-        yield Episode(
+        yield RecordedEpisode(
             seed=episode["seed"],
             task=f"{scene.scenario.title}: repeat what was shown.",
             observations={

@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Episode, Field, write_card
+from apo_bench.benchmark.datasets.card import FPS, DatasetMetadata, Field, RecordedEpisode, write_card
 from apo_bench.benchmark.datasets.episodes import KINDS
 from apo_bench.geometry import Array
 from apo_bench.io import replace_file, write_columns, write_file
@@ -55,7 +55,7 @@ _OF_EPISODE = {
 }
 
 
-def write_lerobot(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
+def write_lerobot(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write episodes, and the card; a frame is what was seen before an action, and the action.
 
     Returns:
@@ -105,7 +105,7 @@ def write_lerobot(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path
     return counted
 
 
-def _columns(rollout: Episode, episode: int, before: int, task: int) -> dict[str, Array]:
+def _columns(rollout: RecordedEpisode, episode: int, before: int, task: int) -> dict[str, Array]:
     """The columns of one episode, (T,) or (T, k)."""
     n = len(rollout.actions)
     last = np.arange(n) == n - 1

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.datasets.card import DatasetMetadata, Episode, Field
+from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEpisode
 from apo_bench.benchmark.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
 from apo_bench.benchmark.datasets.minari import load_h5py, write_minari
 from apo_bench.benchmark.sweeps.stopping import Check, stop_at_signals
@@ -70,7 +70,7 @@ _OF_EPISODE: Mapping[str, str] = MappingProxyType(
 
 def insertions(
     trials: Sequence[TrialConfig], policy: str, command: str, say: Callable[[str], None]
-) -> tuple[DatasetMetadata, Iterator[Episode]]:
+) -> tuple[DatasetMetadata, Iterator[RecordedEpisode]]:
     """Have a policy insert, trial by trial, all scenarios one after the other.
 
     Args:
@@ -101,7 +101,9 @@ def insertions(
     return about, _rollouts(trials, policy, act, say)
 
 
-def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Episode]:
+def _rollouts(
+    trials: Iterable[TrialConfig], policy: str, act: Any, say: Callable[[str], None]
+) -> Iterator[RecordedEpisode]:
     env = None
     for trial in trials:
         if env is None or env.scene.scenario.name != trial.scenario:
@@ -125,7 +127,7 @@ def _rollouts(trials: Iterable[TrialConfig], policy: str, act: Any, say: Callabl
             sights.append(seen)
             rewards.append(reward)
         told = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
-        yield Episode(
+        yield RecordedEpisode(
             seed=trial.seed,
             task=f"{scenario.title}: insert the part in the hand, the last one.",
             observations={name: np.array([each[name] for each in sights]) for name in seen},
@@ -220,7 +222,9 @@ def make_dataset(
     return counted
 
 
-def _write_rollouts(form: str, rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
+def _write_rollouts(
+    form: str, rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, out: Path
+) -> tuple[int, int]:
     if form == "minari":
         return write_minari(rollouts, about, out)
     from apo_bench.benchmark.datasets.lerobot import write_lerobot

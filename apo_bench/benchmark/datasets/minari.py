@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.benchmark.datasets.card import DatasetMetadata, Episode, Field, write_card
+from apo_bench.benchmark.datasets.card import DatasetMetadata, Field, RecordedEpisode, write_card
 from apo_bench.errors import missing_package
 from apo_bench.io import replace_file, write_file
 
@@ -43,7 +43,7 @@ def load_h5py() -> Any:
     return h5py
 
 
-def write_minari(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
+def write_minari(rollouts: Iterable[RecordedEpisode], about: DatasetMetadata, out: Path) -> tuple[int, int]:
     """Write episodes, and the card.
 
     Returns:
@@ -90,7 +90,7 @@ def write_minari(rollouts: Iterable[Episode], about: DatasetMetadata, out: Path)
     return episodes, right
 
 
-def _add(group: Any, rollout: Episode, episode: int) -> None:
+def _add(group: Any, rollout: RecordedEpisode, episode: int) -> None:
     """One episode."""
     rewards = np.asarray(rollout.rewards, dtype=np.float64)
     of_rewards = {f"rewards_{name}": getattr(rewards, name)() for name in ("max", "min", "mean", "std", "sum")}

@@ -17,11 +17,11 @@ from apo_bench.benchmark.analysis import (
     Records,
     Results,
     contrast,
-    percent,
-    percents,
-    points,
-    pooled_rate,
-    rank,
+    format_percent,
+    format_percent_interval,
+    format_points,
+    pool_rate,
+    rank_method,
 )
 from apo_bench.benchmark.analysis.over_seeds import PooledRate
 from apo_bench.records import CORRECTOR, knows_truth, uses_contacts
@@ -51,7 +51,7 @@ def answer(records: Records, half_levels: Sequence[HalfLevel]) -> str:
     if not any(own.success.any() for own in results.values()):
         counts = ", ".join(f"{_named(who)} in 0 of {len(results[who].seed):,}" for who in (best, *others))
         return f"No method succeeds in any trial: {counts}.{wrong}"
-    own = pooled_rate(results[best])
+    own = pool_rate(results[best])
     half = [
         h
         for h in half_levels
@@ -92,7 +92,7 @@ def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
         shared = np.isin(results[who].trial, common) | (len(common) == 0)
         return float(results[who].success[shared].mean())
 
-    return sorted(widely, key=lambda who: (-rate(who), rank(who[0]), who))
+    return sorted(widely, key=lambda who: (-rate(who), rank_method(who[0]), who))
 
 
 def _named(who: _Who) -> str:
@@ -103,9 +103,9 @@ def _named(who: _Who) -> str:
 
 def _counted(who: _Who, own: PooledRate) -> str:
     """`95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %)`."""
-    between = "" if own.seeds < FEWEST_SEEDS else f"; 95 % interval {percents(own.interval)}"
+    between = "" if own.seeds < FEWEST_SEEDS else f"; 95 % interval {format_percent_interval(own.interval)}"
     trials = f"{own.trials:,} trial{'s' * (own.trials != 1)}"
-    return f"{_named(who)} succeeds in {own.right:,} of {trials} ({percent(own.right / own.trials)}{between})."
+    return f"{_named(who)} succeeds in {own.right:,} of {trials} ({format_percent(own.right / own.trials)}{between})."
 
 
 def _few(own: PooledRate) -> str:
@@ -145,7 +145,7 @@ def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
 def _told(ours: _Who, c: Contrast) -> str:
     """What the counts of a pair tell."""
     size = f"{100 * abs(c.difference):.1f} points"
-    between = f"95 % interval {points(c.interval)}"
+    between = f"95 % interval {format_points(c.interval)}"
     if c.sure:
         return f"{_named(ours)} succeeds {'more' if c.difference > 0 else 'less'} often, by {size} ({between})"
     widest = max(-c.interval.low, c.interval.high)

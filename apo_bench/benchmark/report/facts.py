@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from apo_bench.benchmark.report.tables.table import Column, Table
+from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.records.run.trials import Trials
 
 _LONG = 400
@@ -27,7 +27,7 @@ def run_facts(run: Mapping[str, Any], trials: Trials, hosts: Iterable[str]) -> d
         **{f"grid {i}": grid for i, grid in enumerate(run.get("grids", ()), start=1)},
         **{name: value for name, value in run.items() if isinstance(value, dict)},
     }
-    columns = (Column("", "name", "name", words=True), Column("", "value", "value", words=True))
+    columns = (TableColumn("", "name", "name", words=True), TableColumn("", "value", "value", words=True))
     return {
         heading: Table([{"name": name, "value": value_words(x)} for name, x in values.items()], columns)
         for heading, values in tables.items()

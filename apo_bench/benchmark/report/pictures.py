@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import Condition, Records, condition_of, order
+from apo_bench.benchmark.analysis import Condition, Records, get_condition, make_sort_key
 from apo_bench.benchmark.analysis.condition import by_method
 from apo_bench.benchmark.analysis.rates import was_executed
 from apo_bench.records import SecretSeed, TrialRecord
@@ -88,4 +88,4 @@ def _first(trials: Trials) -> Sequence[TrialRecord]:
 def _order(shown: Mapping[str, int], record: TrialRecord) -> tuple[Any, ...]:
     often = shown[record["method"]] + shown[record["scenario"]]
     is_uncorrected = record["method"] == "uncorrected"
-    return (often, record["seed"], is_uncorrected, order(cast(Condition, condition_of(record))))
+    return (often, record["seed"], is_uncorrected, make_sort_key(cast(Condition, get_condition(record))))

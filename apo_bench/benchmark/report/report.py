@@ -8,17 +8,17 @@ from apo_bench.benchmark.analysis import (
     ConditionResult,
     Line,
     Summary,
-    calibrations,
-    confusions,
-    detections,
-    efforts,
-    gaps,
-    probing_results,
+    list_settings,
     read_timing,
-    settings,
-    summary,
-    trial_times,
-    work,
+    summarise,
+    tabulate_calibration,
+    tabulate_confusion,
+    tabulate_detection,
+    tabulate_effort,
+    tabulate_gaps,
+    tabulate_probing,
+    tabulate_trial_times,
+    tabulate_work,
 )
 from apo_bench.benchmark.report.answer import answer
 from apo_bench.benchmark.report.figures.figures import figures
@@ -99,7 +99,7 @@ def report(
     secret_seed = None if secret_seed_file is None else read_secret_seed(secret_seed_file)
     if secret_seed is not None:
         check_same_secret_seed(f"'{folder}'", secret_seed.hash, trials.find_secret_seed())
-    numbers = summary(trials)
+    numbers = summarise(trials)
     require(
         numbers.results,
         f"'{folder}' holds only replays of observations from files, which belong to no condition of a sweep.",
@@ -121,17 +121,17 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
         "conditions": condition_table(numbers.results),
         "pairs": pair_table(numbers.pairs),
         "half_levels": half_table(numbers.half_levels),
-        "gaps": gap_table(gaps(trials)),
-        "confusion": confusion_table(confusions(trials)),
-        "detected": detection_table(detections(trials)),
-        "calibration": calibration_table(calibrations(trials)),
-        "probing": probing_table(probing_results(trials)),
-        "effort": effort_table(efforts(trials)),
-        "times": time_table(trial_times(timing)),
-        "work": work_table(work(timing)),
+        "gaps": gap_table(tabulate_gaps(trials)),
+        "confusion": confusion_table(tabulate_confusion(trials)),
+        "detected": detection_table(tabulate_detection(trials)),
+        "calibration": calibration_table(tabulate_calibration(trials)),
+        "probing": probing_table(tabulate_probing(trials)),
+        "effort": effort_table(tabulate_effort(trials)),
+        "times": time_table(tabulate_trial_times(timing)),
+        "work": work_table(tabulate_work(timing)),
     }
     lines = (tables[name].items for name in ("gaps", "confusion", "detected", "times"))
-    drawn = figures(numbers.results, numbers.pairs, settings(numbers.results), *lines)
+    drawn = figures(numbers.results, numbers.pairs, list_settings(numbers.results), *lines)
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
     kept = [path for paths in written.values() for path in paths]

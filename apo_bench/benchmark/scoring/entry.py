@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.benchmark.analysis import Results, pooled_rate
+from apo_bench.benchmark.analysis import Results, pool_rate
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import UNSHOWN, read_bytes, write_file
@@ -184,7 +184,7 @@ def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
     seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
     success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
     results = Results(np.arange(len(seeds)), seeds, success.astype(float))
-    low, high = pooled_rate(results).interval
+    low, high = pool_rate(results).interval
     return score, min(100.0 * low, score), max(100.0 * high, score)
 
 

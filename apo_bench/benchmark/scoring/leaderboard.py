@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.report.tables.table import Column, Table
+from apo_bench.benchmark.report.tables.table import Table, TableColumn
 from apo_bench.benchmark.scoring.entry import Entry, TrackScore, read_entry
 from apo_bench.benchmark.scoring.track import read_track, track_names
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, default_looks, grouped, save_figure, write_file
+from apo_bench.io import check_target, group_by, save_figure, use_figure_style, write_file
 
 _PROVES = (
     "`self-reported` proves nothing: anyone with the package can draw public seeds again. The author of this table ran "
@@ -119,11 +119,11 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            Column("place", "#"),
-            Column("name", "entry", "entry.name", words=True),
-            Column("score", "score", lambda line: _overall(line.entry)),
-            Column("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
-            Column("status", "status", words=True),
+            TableColumn("place", "#"),
+            TableColumn("name", "entry", "entry.name", words=True),
+            TableColumn("score", "score", lambda line: _overall(line.entry)),
+            TableColumn("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
+            TableColumn("status", "status", words=True),
         ),
     )
 
@@ -135,7 +135,7 @@ def _version(track: TrackScore) -> tuple[str, bool]:
 
 def _used_versions(entries: Sequence[Entry]) -> dict[str, tuple[str, bool]]:
     """The version of each track that most entries have; of equally many that of the package, else the first."""
-    stated = grouped((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
+    stated = group_by((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
     for name in set(stated) & set(track_names()):
         own = read_track(name)
         stated[name].sort(key=lambda version: version != (own.hash, own.overall))
@@ -150,24 +150,28 @@ def _tracks(entries: Sequence[Entry]) -> list[str]:
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
     runs = [Run(line.entry, name, line.entry.tracks[name]) for line in lines for name in line.entry.tracks]
-    entry = Column("name", "entry", "entry.name", words=True)
-    track = Column("track", "track", "name", words=True)
-    every = (entry, *(Column(name, name, partial(_score_words, name)) for name in tracks))
+    entry = TableColumn("name", "entry", "entry.name", words=True)
+    track = TableColumn("track", "track", "name", words=True)
+    every = (entry, *(TableColumn(name, name, partial(_score_words, name)) for name in tracks))
     predicting = (
-        *(entry, track, Column("predicted_success", "predicted success", text="{track.predicted_success:percent}")),
-        Column("score", "score", text="{track.score:.1f}"),
-        Column("brier", "Brier score", text="{track.brier:.3f}"),
+        *(
+            entry,
+            track,
+            TableColumn("predicted_success", "predicted success", text="{track.predicted_success:percent}"),
+        ),
+        TableColumn("score", "score", text="{track.score:.1f}"),
+        TableColumn("brier", "Brier score", text="{track.brier:.3f}"),
     )
     hashes = (
-        *(entry, track, Column("trials", "trials", "track.trials")),
-        Column("file", "track file", "track.track", words=True),
-        Column("code", "code", "track.code", words=True),
-        Column("rows", "records", "track.rows", words=True),
+        *(entry, track, TableColumn("trials", "trials", "track.trials")),
+        TableColumn("file", "track file", "track.track", words=True),
+        TableColumn("code", "code", "track.code", words=True),
+        TableColumn("rows", "records", "track.rows", words=True),
     )
     machines = (
-        *(entry, Column("command", "command", "entry.command", words=True)),
-        Column("versions", "versions", _versions_text, words=True),
-        Column("machine", "machine", "entry.machine", words=True),
+        *(entry, TableColumn("command", "command", "entry.command", words=True)),
+        TableColumn("versions", "versions", _versions_text, words=True),
+        TableColumn("machine", "machine", "entry.machine", words=True),
     )
     yield from ("# Leaderboard", "", "Written by `apo-bench leaderboard`.", "", _PROVES, "")
     yield from leaderboard_table(lines).markdown()
@@ -184,7 +188,7 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
     """A square for every entry and track, darker where more trials succeeded, with its number."""
-    with default_looks({"font.size": 9.0}), warnings.catch_warnings():
+    with use_figure_style({"font.size": 9.0}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
         from matplotlib.figure import Figure
 

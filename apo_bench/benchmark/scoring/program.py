@@ -25,7 +25,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.formats.json_forms import PoseForm
 from apo_bench.formats.observation_json import observation_form
 from apo_bench.geometry import Array, Face, RoundFace
-from apo_bench.io import Table, convert_typed, decoded, parse_plain, write_file
+from apo_bench.io import FileTable, convert_typed, decode_text, parse_plain, write_file
 from apo_bench.names import own_modules_in
 
 REQUEST = "apo-bench/request/1"
@@ -104,7 +104,7 @@ def ask_program(command: tuple[str, ...], folder: str, observation: Observation)
     require(ended.returncode == 0, f"{program} ended with exit code {ended.returncode}.")
     require(answer.strip(), f"{program} wrote no answer; one line of JSON is needed.")
     where = f"the answer of {program.removeprefix('the program ')}"
-    form = convert_typed(parse_plain(decoded(answer, where, "JSON"), where, "json"), _Answer, where)
+    form = convert_typed(parse_plain(decode_text(answer, where, "JSON"), where, "json"), _Answer, where)
     count = len(observation.poses)
     require(len(form.poses) == count, f"{where}, poses: {count} entries are needed, {len(form.poses)} were given.")
     poses = [each.matrix(f"{where}, pose {i}") for i, each in enumerate(form.poses, start=1)]
@@ -131,7 +131,7 @@ def _request_form(observation: Observation) -> dict[str, Any]:
     return {**form, "schema": REQUEST, "fixed": sorted(assembly.fixed), "faces": faces}
 
 
-class _Answer(Table, frozen=True, kw_only=True):
+class _Answer(FileTable, frozen=True, kw_only=True):
     poses: list[PoseForm]
     id: str = ""
 

@@ -16,7 +16,7 @@ from apo_bench.benchmark.analysis.rates import brier_score, mean, was_executed
 from apo_bench.benchmark.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.benchmark.scoring.track import Track
 from apo_bench.benchmark.sweeps.sweep import run_sweep
-from apo_bench.io import brief, clean, grouped
+from apo_bench.io import clean, group_by, shorten_text
 from apo_bench.records import SETTINGS, TrialRecord
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.trials import trials_of
@@ -72,7 +72,7 @@ def score(
         schema=SCHEMA,
         name=name,
         method=(SETTINGS["method"].spelled or str)(method),
-        command=brief(clean(command)),
+        command=shorten_text(clean(command)),
         quick=quick,
         versions=dict(sorted(versions.items())),
         machine=platform.platform(),
@@ -106,7 +106,7 @@ def _score_track(track: Track, records: Sequence[TrialRecord], run: Mapping[str,
 def _spell_conditions(records: Iterable[TrialRecord]) -> dict[str, str]:
     """Settings of a condition -> its trials, one character each, the first seed first."""
     spelled = {True: RIGHT, False: WRONG, None: EXCLUDED}
-    conditions = grouped(
+    conditions = group_by(
         ("|".join([record["arm"], *(str(record.get(name)) for name in _SPELLED)]), record) for record in records
     )
     return {

@@ -22,7 +22,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.sweeps.grid import SweepConfig
 from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.errors import require, unknown
-from apo_bench.io import Table, Text, convert_typed, read_bytes, read_plain
+from apo_bench.io import FileTable, Text, convert_typed, read_bytes, read_plain
 from apo_bench.records import TrialConfig
 from apo_bench.resources import folder
 
@@ -55,7 +55,7 @@ class Track:
         )
 
 
-class TrackTable(Table, frozen=True, kw_only=True):
+class TrackTable(FileTable, frozen=True, kw_only=True):
     """`[track]`."""
 
     schema: Literal["apo-bench/track/1"]

@@ -22,7 +22,7 @@ from apo_bench.benchmark.sweeps.grid import Batch
 from apo_bench.benchmark.sweeps.pool import THREADS, Emit, process_pool, run_in_pool
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs
 from apo_bench.errors import InputError, require
-from apo_bench.io import environment
+from apo_bench.io import set_environment
 
 _TOUCH_S = 5.0
 """What the port of a cluster gets to open."""
@@ -143,7 +143,7 @@ def _join(address: str | None, workers: int | None, files: Mapping[str, Path]) -
 
     handler = signal.getsignal(signal.SIGTERM)
     alone = {"num_cpus": max(workers or 1, os.cpu_count() or 1), "object_store_memory": _OBJECT_STORE}
-    with tempfile.TemporaryDirectory() as folder, environment(_SETTINGS):
+    with tempfile.TemporaryDirectory() as folder, set_environment(_SETTINGS):
         for name, path in files.items():
             (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, Path(folder) / name)

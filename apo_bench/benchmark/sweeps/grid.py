@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from typing import Any, final
 
 from apo_bench.errors import require, shown
-from apo_bench.io import UNSHOWN, grouped
+from apo_bench.io import UNSHOWN, group_by
 from apo_bench.records import (
     DEPTH_CAMERA,
     NOISE_LEVEL,
@@ -21,7 +21,7 @@ from apo_bench.records import (
     check_grip,
     check_together,
     knows_truth,
-    noise_pair,
+    parse_noise_level,
     probes,
     refuse_noise,
 )
@@ -58,11 +58,17 @@ _Axes: Any = make_dataclass("_Axes", _axis_fields(), frozen=True)
 @final
 @dataclass(frozen=True)
 class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so that a new one is in sweeps as well
-    """The settings of a sweep; it runs every combination, with the same seeds in each.
+    """The settings of a sweep, which runs every combination with the same seeds.
 
     Every setting of `TrialConfig` is a keyword; it takes one value or several. Noise levels are numbers, or pairs of mm
     and degrees; `noise_mm` and `noise_deg` may be given in their place. Settings that do not affect a method, such as
     the noise of `oracle`, are recorded for it as their defaults, and such a trial runs once.
+
+    Examples:
+        >>> import apo_bench
+        >>> grid = apo_bench.SweepConfig("stick_in_tower", noise_level=[0.5, 1], method="contact", trials=10)
+        >>> grid.noise_level
+        (0.5, 1.0)
     """
 
     scenario: tuple[str, ...]
@@ -72,7 +78,9 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
     noise: tuple[str, ...] = field(default=(), kw_only=True)
     """Default: `isotropic`; none with the pose source `depth-camera` alone."""
     noise_mm: tuple[float, ...] = field(default=(), kw_only=True)
+    """In place of `noise_level`: standard deviations of positions."""
     noise_deg: tuple[float, ...] = field(default=(), kw_only=True)
+    """In place of `noise_level`: standard deviations of rotation vectors."""
     trials: int = field(default=100, kw_only=True)
     """Trials of each combination."""
     seed: int = field(default=0, kw_only=True)
@@ -109,7 +117,7 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
         else:
             object.__setattr__(self, "noise", self.noise or (TrialConfig.noise,))
         for level, source in product(self.noise_level, self.pose_source):
-            noise_pair(level, source)
+            parse_noise_level(level, source)
         check_together(self.fidelity, *self.grasp)
         check_grip(any(map(probes, self.method)), *self.grasp)
 
@@ -176,7 +184,7 @@ def units(
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
         for source, scenario in loaded.items():
             same = {"scenario": source, "seed": seed, "secret_seed": secret_seed}
-            together = grouped(
+            together = group_by(
                 ((trial.clearance_mm, trial.human_error_scale, trial.pose_source), trial)
                 for grid in those
                 if source in grid.scenario
@@ -210,5 +218,5 @@ def _trials(grid: SweepConfig, same: Mapping[str, Any]) -> Iterator[TrialConfig]
             values |= {"noise_level": 0.0, "human_error_scale": 0.0, **first}
         if values["pose_source"] == DEPTH_CAMERA:
             values["noise"] = DEPTH_CAMERA
-        mm, deg = noise_pair(values.pop("noise_level"), values["pose_source"])
+        mm, deg = parse_noise_level(values.pop("noise_level"), values["pose_source"])
         yield TrialConfig(**same, **shared, **values, noise_mm=mm, noise_deg=deg)

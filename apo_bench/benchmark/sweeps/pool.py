@@ -22,7 +22,7 @@ from apo_bench.benchmark.sweeps.grid import Batch
 from apo_bench.benchmark.sweeps.stopping import stop_at_signals
 from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs, Timing, Worker, timing
 from apo_bench.errors import require
-from apo_bench.io import SAFE_PATH, environment
+from apo_bench.io import SAFE_PATH, set_environment
 from apo_bench.names import add_own_modules, folder_of_own_modules
 from apo_bench.records import TrialRecord
 from apo_bench.trial.endings import record_lost_trial
@@ -54,7 +54,7 @@ def process_pool(workers: int) -> Iterator[ProcessPool]:
     """New interpreters that have imported what trials need; they are ended with the context."""
     spawn: Any = multiprocessing.get_context("spawn")
     pool = ProcessPool(workers, _MOST_BATCHES, prepare_process, [folder_of_own_modules()], spawn)
-    with environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
+    with set_environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
         try:
             _start(pool)
             yield pool

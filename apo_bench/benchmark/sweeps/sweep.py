@@ -21,11 +21,11 @@ from apo_bench.records import (
     Limits,
     TrialConfig,
     TrialRecord,
-    noise_pair,
+    make_trial_key,
+    open_secret_seed,
     parse_method,
-    secret_seed_of_sweep,
-    trial_key,
-    with_simulated,
+    parse_noise_level,
+    resolve_simulated,
 )
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder, read_records
@@ -88,7 +88,7 @@ def run_sweep(
     arm = find_arm(arm_name)
     content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
     inputs = SweepInputs(content, versions())
-    secret_seed = None if secret_seed_file is None else secret_seed_of_sweep(secret_seed_file, out)
+    secret_seed = None if secret_seed_file is None else open_secret_seed(secret_seed_file, out)
     here = workers is None and backend == "local"
     run = run_record(
         describe_grids(grids, loaded),
@@ -133,7 +133,7 @@ def _left(
     for unit in work:
         left = []
         for trial in unit:
-            found = store.finished.get(trial_key(trial, loaded[trial.scenario].name))
+            found = store.finished.get(make_trial_key(trial, loaded[trial.scenario].name))
             cell = replace(trial, method=CORRECTOR, seed=0)
             if found is None:
                 left.append(trial)
@@ -168,7 +168,7 @@ def _check_executor(workers: int | None, limit_s: float, backend: str, address: 
 def _check_names(grids: Sequence[SweepConfig]) -> None:
     """Raise an `InputError` unless noise models, contact sources and correctors can be imported here."""
     for grid in grids:
-        highest = max(max(noise_pair(noise_level)) for noise_level in grid.noise_level)
+        highest = max(max(parse_noise_level(noise_level)) for noise_level in grid.noise_level)
         for noise in grid.noise:
             make_noise(noise, NoiseLevel(highest, highest))
         for contact_source in grid.contact_source:
@@ -177,7 +177,7 @@ def _check_names(grids: Sequence[SweepConfig]) -> None:
         for method in grid.method:
             corrector = parse_method(method).corrector
             if corrector not in WITHOUT_CORRECTOR:
-                resolve_corrector(with_simulated(corrector))
+                resolve_corrector(resolve_simulated(corrector))
 
 
 def _names(grids: Sequence[SweepConfig], axis: str) -> tuple[str, ...]:

@@ -22,8 +22,8 @@ from msgspec import UNSET
 from apo_bench.arguments import check_arguments
 from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
 from apo_bench.errors import InputError
-from apo_bench.io import Positive, Table, convert_typed, read_plain
-from apo_bench.records import SETTINGS, in_python
+from apo_bench.io import FileTable, Positive, convert_typed, read_plain
+from apo_bench.records import SETTINGS, convert_to_python_units
 
 _SEVERAL = (*(info.name for info in AXES), "noise_mm", "noise_deg")
 """Keys that take one value or several."""
@@ -31,7 +31,7 @@ _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
 SWEEP_KEYS = (*_SEVERAL, "trials", "seed")
 _VALUES = [(key, Any, UNSET) for key in SWEEP_KEYS]
-AlsoTable = msgspec.defstruct("AlsoTable", _VALUES, bases=(Table,), kw_only=True)
+AlsoTable = msgspec.defstruct("AlsoTable", _VALUES, bases=(FileTable,), kw_only=True)
 """`[[also]]`: a further grid."""
 SweepTable = msgspec.defstruct(
     "SweepTable",
@@ -40,7 +40,7 @@ SweepTable = msgspec.defstruct(
         *((key, Any if info.is_text else Positive, UNSET) for key, info in _ALONE.items()),
         ("also", list[AlsoTable], []),  # type: ignore[valid-type]
     ],
-    bases=(Table,),
+    bases=(FileTable,),
     kw_only=True,
 )
 """A whole file."""
@@ -83,7 +83,7 @@ def read_sweep(
 def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
     """The grid of some values, which it checks itself."""
     try:
-        return SweepConfig(**in_python(values))
+        return SweepConfig(**convert_to_python_units(values))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 

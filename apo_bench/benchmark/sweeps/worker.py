@@ -8,7 +8,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.sweeps.grid import Batch
 from apo_bench.errors import require
-from apo_bench.records import KEY, TrialConfig, TrialRecord, record_key
+from apo_bench.records import KEY, TrialConfig, TrialRecord, get_record_key
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, versions
@@ -94,7 +94,7 @@ def timing(
 ) -> Timing:
     """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
     return {
-        **dict(zip(KEY, record_key(record), strict=True)),
+        **dict(zip(KEY, get_record_key(record), strict=True)),
         "compile_s": compile_s,
         "demonstrate_s": demonstrate_s,
         "trial_s": trial_s,

@@ -12,15 +12,21 @@ from apo_bench.cli.shared.arguments import (
     ScenarioArgument,
     SecretSeedFile,
     Workers,
-    path_argument,
-    path_option,
+    make_path_argument,
+    make_path_option,
 )
-from apo_bench.cli.shared.completion import completion
+from apo_bench.cli.shared.completion import complete_last_word
 from apo_bench.cli.shared.cores import count_cores
-from apo_bench.cli.shared.help import GROUPS, OPTIONS, Command, Group, Interrupted, group
-from apo_bench.cli.shared.outputs import check_output, writing
-from apo_bench.cli.shared.printing import console, print_columns, print_json, print_table, print_written, say
-from apo_bench.cli.shared.setting_options import read_axis, shown_default, sweep_options, takes, trial_options
+from apo_bench.cli.shared.help import GROUPS, OPTIONS, Command, Group, Interruption, make_group
+from apo_bench.cli.shared.outputs import check_output, name_write_errors
+from apo_bench.cli.shared.printing import make_console, print_columns, print_json, print_table, print_written, say
+from apo_bench.cli.shared.setting_options import (
+    add_options,
+    format_default,
+    make_sweep_options,
+    make_trial_options,
+    read_axis,
+)
 from apo_bench.cli.shared.values import parse_list, parse_path
 
 __all__ = (
@@ -34,30 +40,30 @@ __all__ = (
     "DeviationDeg",
     "DeviationMm",
     "Group",
-    "Interrupted",
+    "Interruption",
     "MethodArgument",
     "Port",
     "ScenarioArgument",
     "SecretSeedFile",
     "Workers",
+    "add_options",
     "check_output",
-    "completion",
-    "console",
+    "complete_last_word",
     "count_cores",
-    "group",
+    "format_default",
+    "make_console",
+    "make_group",
+    "make_path_argument",
+    "make_path_option",
+    "make_sweep_options",
+    "make_trial_options",
+    "name_write_errors",
     "parse_list",
     "parse_path",
-    "path_argument",
-    "path_option",
     "print_columns",
     "print_json",
     "print_table",
     "print_written",
     "read_axis",
     "say",
-    "shown_default",
-    "sweep_options",
-    "takes",
-    "trial_options",
-    "writing",
 )

@@ -27,7 +27,7 @@ def offered_names(setting: str) -> list[str]:
     return [*METHODS, "spiral-search"] if setting == "method" else [*SETTINGS[setting].choices]
 
 
-def completion(setting: str) -> Completion:
+def complete_last_word(setting: str) -> Completion:
     """Offer names that begin like the text after the last comma."""
 
     def complete(incomplete: str) -> list[str]:

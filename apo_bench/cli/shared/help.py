@@ -40,7 +40,7 @@ _WHOLE = 10_000  # letters of a sentence that are shown: all
 _KILLED = 128  # plus the number of a signal: the exit code of a process that it ended
 
 
-class Interrupted(Exception):
+class Interruption(Exception):
     """A signal ended a command.
 
     Attributes:
@@ -78,7 +78,7 @@ class Command(_WithExamples, TyperCommand):
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
             kept = "; the trials that ended are kept, and the same command continues"
-            raise Interrupted(error, kept * (self.name in _RESUMED)) from error
+            raise Interruption(error, kept * (self.name in _RESUMED)) from error
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write a list for each heading that has an option here."""
@@ -113,6 +113,6 @@ class Group(_WithExamples, TyperGroup):
                 formatter.write_dl([(f"{name:{widest}}", sentences[name]) for name in names])
 
 
-def group(name: str, description: str) -> typer.Typer:
+def make_group(name: str, description: str) -> typer.Typer:
     """Commands below one name."""
     return typer.Typer(name=name, cls=Group, rich_markup_mode=None, help=description)

@@ -38,7 +38,7 @@ def check_output(
 
 
 @contextmanager
-def writing(target: str = "") -> Iterator[None]:
+def name_write_errors(target: str = "") -> Iterator[None]:
     """Turn an operating system error into one about `--out FILE`, or about the file that failed."""
     try:
         yield

@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from apo_bench.io import clean, columns
+from apo_bench.io import align_columns, clean
 
 
 def print_json(form: Any) -> None:
@@ -34,21 +34,21 @@ def print_columns(lines: Iterable[Sequence[str]]) -> None:
 
     cleaned = [[clean(cell) for cell in cells] for cells in lines]
     if not sys.stdout.isatty():
-        typer.echo("\n".join(columns(cleaned)))
+        typer.echo("\n".join(align_columns(cleaned)))
         return
     table = Table(box=None, pad_edge=False, show_header=False)
     for cells in cleaned:
         table.add_row(*cells)
-    console().print(table)
+    make_console().print(table)
 
 
 def print_table(table: Any, narrowest: int = 110) -> None:
     """Print a table of `rich` after an empty line."""
     typer.echo()
-    console(narrowest).print(table)
+    make_console(narrowest).print(table)
 
 
-def console(narrowest: int = 80) -> Any:
+def make_console(narrowest: int = 80) -> Any:
     """A console as wide as the terminal; where there is none, wide enough to keep lines whole."""
     from rich.console import Console
 

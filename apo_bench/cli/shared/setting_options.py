@@ -7,8 +7,8 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from apo_bench.cli.shared.arguments import path_option
-from apo_bench.cli.shared.completion import completion
+from apo_bench.cli.shared.arguments import make_path_option
+from apo_bench.cli.shared.completion import complete_last_word
 from apo_bench.cli.shared.values import parse_list
 from apo_bench.records import NOISE_LEVEL, SETTINGS, SettingInfo
 from apo_bench.records.run.replay_command import milli, number
@@ -16,7 +16,7 @@ from apo_bench.records.run.replay_command import milli, number
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
-def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
+def add_options(options: Iterable[Parameter]) -> Callable[[Command], Command]:
     """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**options`."""
 
     def wrap(command: Command) -> Command:
@@ -29,13 +29,13 @@ def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
     return wrap
 
 
-def trial_options(*names: str) -> list[Parameter]:
+def make_trial_options(*names: str) -> list[Parameter]:
     """Options of one trial for these settings, or for all; each may be left out."""
     infos = {NOISE_LEVEL.name: NOISE_LEVEL, **SETTINGS}
     return [_trial_option(info) for name, info in infos.items() if info.help and (not names or name in names)]
 
 
-def sweep_options() -> list[Parameter]:
+def make_sweep_options() -> list[Parameter]:
     """Options of a sweep: its axes, and the settings that all of its trials share."""
     axes = [info for info in (NOISE_LEVEL, *SETTINGS.values()) if info.axis and info.help]
     shared = [info for info in SETTINGS.values() if info.shared]
@@ -51,26 +51,26 @@ def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
     return parse_list(text, f"--{info.option}", kind)
 
 
-def shown_default(info: SettingInfo) -> str:
+def format_default(info: SettingInfo) -> str:
     """The default of a setting, in the unit of its option."""
     return info.usual or _in_option_unit(info, info.default)
 
 
 def _trial_option(info: SettingInfo) -> Parameter:
-    description = f"{info.help}; default: {shown_default(info)}."
+    description = f"{info.help}; default: {format_default(info)}."
     if info.name == "secret_seed":
-        return _parameter(info, Path, path_option(description))
+        return _parameter(info, Path, make_path_option(description))
     return _parameter(info, getattr(info.kind, "__origin__", info.kind), _option(info, description))
 
 
 def _axis_option(info: SettingInfo) -> Parameter:
-    usual = ",".join(_in_option_unit(info, value) for value in info.swept) or shown_default(info)
+    usual = ",".join(_in_option_unit(info, value) for value in info.swept) or format_default(info)
     return _parameter(info, str, _option(info, f"{info.help}; several with commas; default: {usual}."))
 
 
 def _option(info: SettingInfo, description: str) -> Any:
     named = info.choices or info.name in ("noise", "arm", "contact_source", "method")
-    return typer.Option(help=description, autocompletion=completion(info.name) if named else None)
+    return typer.Option(help=description, autocompletion=complete_last_word(info.name) if named else None)
 
 
 def _parameter(info: SettingInfo, kind: Any, option: Any) -> Parameter:

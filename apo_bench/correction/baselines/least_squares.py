@@ -9,7 +9,7 @@ CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of oper
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, contact_equations
+from apo_bench.assembly import Correction, Observation, build_contact_equations
 from apo_bench.correction.checks.as_given import run_method
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
@@ -41,7 +41,7 @@ def _solve(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
     space = whitened(observation)
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     prior = np.eye(6 * len(observation.poses))
 
     def residual(z: Array) -> Array:

@@ -1,6 +1,6 @@
 """The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
 
-from apo_bench.assembly import Correction, Observation, contact_equations, largest
+from apo_bench.assembly import Correction, Observation, build_contact_equations, find_largest_residual
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
@@ -17,11 +17,11 @@ def paper(observation: Observation) -> Correction:
     """
     if not observation.observed.all():
         return refuse_correction(observation)
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     before = system.gaps(observation.poses)
     freed = candidates(observation.assembly, ~(before <= observation.gap_m))
     solution = solve_newton(system.among(system.containing(freed)), observation.poses, freed)
-    status = solver_status(solution, largest(system.gaps(solution.poses)), observation.gap_m)
+    status = solver_status(solution, find_largest_residual(system.gaps(solution.poses)), observation.gap_m)
     poses = solution.poses
     if status == "converged":
         for k in sorted(set(range(len(poses))).difference(freed)):
@@ -31,8 +31,8 @@ def paper(observation: Observation) -> Correction:
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=freed,
-        gap_before_m=largest(before),
-        gap_after_m=largest(system.gaps(poses)),
+        gap_before_m=find_largest_residual(before),
+        gap_after_m=find_largest_residual(system.gaps(poses)),
         rank=solution.rank,
         trace=solution.trace,
     )

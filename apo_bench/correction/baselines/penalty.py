@@ -16,10 +16,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation, contact_equations
+from apo_bench.assembly import Correction, Equations, Observation, build_contact_equations
 from apo_bench.correction.baselines.intruding_boxes import Meeting, intruding, meeting
 from apo_bench.correction.checks.as_given import run_method
-from apo_bench.correction.solvers import Whitened
+from apo_bench.correction.solvers import WhitenedPoses
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -59,7 +59,7 @@ def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, l
 class Loss:
     """What is gone down, as a function of z."""
 
-    space: Whitened
+    space: WhitenedPoses
     contacts: Equations
     meetings: Meeting
     contact_m: float
@@ -78,7 +78,7 @@ class Loss:
 
 def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss:
     """The loss of an observation."""
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 

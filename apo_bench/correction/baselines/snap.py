@@ -7,9 +7,9 @@ sense of least squares.
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Equations, Observation, contact_equations
+from apo_bench.assembly import Correction, Equations, Observation, build_contact_equations
 from apo_bench.correction.checks.as_given import TWIST_UNITS, run_method
-from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, Whitened
+from apo_bench.correction.solvers import REST_M, SINGULAR_CUT_OFF, WhitenedPoses
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -31,20 +31,20 @@ def snap(observation: Observation) -> Correction:
 def _snap_all(observation: Observation) -> Array:
     poses = np.array(observation.poses)
     space = whitened(observation)
-    system = contact_equations(observation.assembly, observation.start, poses)
+    system = build_contact_equations(observation.assembly, observation.start, poses)
     for k in range(len(poses)):
         poses[k] = _put(system.among(system.made == k), poses, k, space)
     return poses
 
 
-def _put(own: Equations, poses: Array, k: int, space: Whitened) -> Array:
+def _put(own: Equations, poses: Array, k: int, space: WhitenedPoses) -> Array:
     """The pose of operation k, (4, 4), nearest to the seen one of those with the least sum of squared gaps.
 
     At each iteration the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15
     and 22), and the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t
     covariance V)^-1 (c + V^t xi).
     """
-    coordinates = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
+    coordinates = WhitenedPoses(space.observed[k : k + 1], space.factor[k : k + 1])
     now = np.array(poses)
     z = np.zeros(6)
     for _ in range(_ITERATIONS):

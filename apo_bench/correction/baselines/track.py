@@ -12,7 +12,16 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Correction, Equations, Iterate, Observation, Step, Try, contact_equations, largest
+from apo_bench.assembly import (
+    Correction,
+    Equations,
+    FreeingTrial,
+    Iterate,
+    Observation,
+    Step,
+    build_contact_equations,
+    find_largest_residual,
+)
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.checks.status import refuse_correction, solver_status, status_sentence
@@ -47,7 +56,7 @@ class TrackedOperation:
     """(n + 1, 4, 4): the poses now in force; those before if nothing sufficed."""
     status: str
     freed: tuple[int, ...] = ()
-    tried: tuple[Try, ...] = ()
+    tried: tuple[FreeingTrial, ...] = ()
     rank: int = 0
     trace: tuple[Iterate, ...] = ()
 
@@ -80,18 +89,18 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
 def next_operation(observation: Observation, poses: Array, sets: _Sets) -> TrackedOperation:
     """What one more operation asks for: the last of these poses has just been observed, the others are in force."""
     n = len(poses) - 1
-    system = contact_equations(observation.assembly.first(n + 1), observation.start, poses)
+    system = build_contact_equations(observation.assembly.first(n + 1), observation.start, poses)
     failing = ~(system.gaps(poses) <= observation.gap_m)
     if not failing[system.made == n].any():
         return TrackedOperation(solve_own_contacts(system, poses, n, observation.gap_m), "converged")
     chosen = candidates(observation.assembly.first(n + 1), failing)
-    tried = list[Try]()
+    tried = list[FreeingTrial]()
     last = None
     for free in sets(chosen):
         last, left_m = _trial(system, poses, free, failing)
         if not last.finite:
             break
-        tried.append(Try(n, free, left_m))
+        tried.append(FreeingTrial(n, free, left_m))
         if left_m <= observation.gap_m:
             return TrackedOperation(last.poses, "converged", free, tuple(tried), last.rank, last.trace)
     status = "inconsistent" if last is None else solver_status(last, np.inf, observation.gap_m)
@@ -104,7 +113,7 @@ def _trial(
     """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
     chosen = system.containing(free)
     solution = solve_newton(system.among(chosen), poses, free)
-    return solution, largest(system.gaps(solution.poses)[chosen | failing])
+    return solution, find_largest_residual(system.gaps(solution.poses)[chosen | failing])
 
 
 def _report(
@@ -114,7 +123,7 @@ def _report(
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
-    system = contact_equations(observation.assembly, observation.start, observation.poses)
+    system = build_contact_equations(observation.assembly, observation.start, observation.poses)
     status = steps[-1].status if steps else "converged"
     last = next((step for step in reversed(steps) if step.trace), TrackedOperation(poses, status))
     return Correction(
@@ -122,8 +131,8 @@ def _report(
         status=status,
         sentence=status_sentence(status, observation.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
-        gap_before_m=largest(system.gaps(observation.poses)),
-        gap_after_m=largest(system.gaps(poses)),
+        gap_before_m=find_largest_residual(system.gaps(observation.poses)),
+        gap_after_m=find_largest_residual(system.gaps(poses)),
         rank=last.rank,
         trace=last.trace,
         tried=tuple(one for step in steps for one in step.tried),

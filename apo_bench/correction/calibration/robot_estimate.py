@@ -13,15 +13,15 @@ from apo_bench.correction.calibration.robot_model import (
     HAND_EYE,
     TOOL,
     Places,
+    compute_part_poses,
     grasp_in,
     hand_eye_displacement,
     joints_in,
-    part_poses,
     tip_displacement,
 )
 from apo_bench.correction.calibration.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.errors import kind, require
-from apo_bench.geometry import Array, copyable, freeze, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, freeze, make_copyable, pose
 from apo_bench.records.robot_error import Sigmas
 
 UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5, 1.0))
@@ -30,7 +30,7 @@ UNKNOWN = Sigmas(hand_eye=(1.0, 0.2), joints_deg=0.05, tool_mm=0.5, in_hand=(0.5
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class RobotEstimate:
     """Mean and covariance of all unknowns of `robot_model`, after all touches so far."""
@@ -166,7 +166,7 @@ class RobotEstimate:
         B = checked_pose("pose of the tip", T_world_tip)
         held = checked_pose("pose of the part in the hand", np.eye(4) if T_tip_part is None else T_tip_part)
         place = Places(B[None], self._jacobian(jacobian)[None], held[None], np.array([self._grasp(grasp)]))
-        return part_poses(self.mean, self.middle, place)[1][0]
+        return compute_part_poses(self.mean, self.middle, place)[1][0]
 
     def covariance_of(
         self,
@@ -189,11 +189,11 @@ class RobotEstimate:
 
     def _jacobian(self, jacobian: ArrayLike | None) -> Array:
         """(6, joints): zeros if none was given."""
-        return np.zeros((6, self.joints)) if jacobian is None else frozen(jacobian, 6, self.joints)
+        return np.zeros((6, self.joints)) if jacobian is None else copy_frozen(jacobian, 6, self.joints)
 
 
 @check_arguments
-def prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
+def make_prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstimate:
     """The estimate before the first touch: no error, with the stated standard deviations.
 
     Args:
@@ -208,16 +208,16 @@ def prior_estimate(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotEstim
     prior[TOOL] = 1e-3 * sigmas.tool_mm
     prior[joints_in(joints)] = np.radians(sigmas.joints_deg)
     checked = _checked_sigmas(prior, len(prior))
-    return RobotEstimate(frozen(middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2))
+    return RobotEstimate(copy_frozen(middle, 3), joints, (), checked, np.zeros(len(checked)), np.diag(checked**2))
 
 
-def slip_sigmas(sigmas: Sigmas) -> Array:
+def compute_slip_sigmas(sigmas: Sigmas) -> Array:
     """How far a part may slip in the hand, (6,), [m, rad]: along the pads, y and z of the tip, and about x."""
     mm, deg = sigmas.in_hand
     return np.array([0.0, 1e-3 * mm, 1e-3 * mm, np.radians(deg), 0.0, 0.0])
 
 
 def _checked_sigmas(sigmas: ArrayLike, n: int) -> Array:
-    checked = frozen(sigmas, n)
+    checked = copy_frozen(sigmas, n)
     require((checked >= 0.0).all(), f"a standard deviation of {checked.min():g} was given; 0 or more is allowed.")
     return checked

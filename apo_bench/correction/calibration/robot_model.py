@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import Array, Ints, exp_and_jacobian, pose
+from apo_bench.geometry import Array, Ints, compute_exp_and_jacobian, pose
 
 HAND_EYE = slice(0, 6)
 TOOL = slice(6, 9)
@@ -53,7 +53,7 @@ def tip_displacement(unknowns: Array, J: Array) -> Array:
     return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ pose.rigid(np.eye(3), unknowns[TOOL]))
 
 
-def part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:
+def compute_part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:
     """Where the parts really are, and how their body twists depend on the unknowns.
 
     Args:
@@ -70,9 +70,9 @@ def part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, A
     columns = (joints.stop + 6 * grasp[:, None] + np.arange(6))[holds]
     gamma = np.zeros((len(grasp), 6))
     gamma[holds] = unknowns[columns]
-    turned, D_xi = exp_and_jacobian(unknowns[HAND_EYE])
-    moved, D_delta = exp_and_jacobian(J @ unknowns[joints])
-    slipped, D_gamma = exp_and_jacobian(gamma)
+    turned, D_xi = compute_exp_and_jacobian(unknowns[HAND_EYE])
+    moved, D_delta = compute_exp_and_jacobian(J @ unknowns[joints])
+    slipped, D_gamma = compute_exp_and_jacobian(gamma)
     D = np.zeros((len(grasp), 6, len(unknowns)))
     # From the last factor of the product to the first: a twist before T is the twist Ad(T^-1) of it behind T.
     T = T_tip_part

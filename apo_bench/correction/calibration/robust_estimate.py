@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.touch import Touch
-from apo_bench.correction.calibration.robot_model import Places, part_poses
+from apo_bench.correction.calibration.robot_model import Places, compute_part_poses
 from apo_bench.geometry import Array, pose
 
 REFUSED_BEYOND = 5.0
@@ -133,7 +133,7 @@ def _sum(z: Array, A: Array, y: Array) -> float:
 
 def _linearise(equations: TouchEquations, sigmas: Array, middle: Array, z: Array) -> tuple[Array, Array]:
     """A (t, u) and y (t,): near z the residual of each touch, over its sigma, is A z - y."""
-    T, D = part_poses(sigmas * z, middle, equations.places)
+    T, D = compute_part_poses(sigmas * z, middle, equations.places)
     points = equations.points[:, :, None]
     R = T[:, :3, :3]
     off = (equations.normals * (R @ points + T[:, :3, 3:])[..., 0]).sum(axis=1) - equations.offsets

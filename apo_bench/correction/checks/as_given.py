@@ -4,9 +4,22 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, contact_equations, largest, largest_gap, project_observation
+from apo_bench.assembly import (
+    Correction,
+    Observation,
+    build_contact_equations,
+    find_largest_residual,
+    measure_largest_gap,
+    project_observation,
+)
 from apo_bench.correction.checks.status import refuse_correction, status_sentence
-from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, demands_of, least_step, violations
+from apo_bench.correction.solvers import (
+    LENGTH_M,
+    SINGULAR_CUT_OFF,
+    compute_least_step,
+    compute_violations,
+    list_contact_demands,
+)
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 
@@ -22,13 +35,15 @@ def poses_as_given(observation: Observation, poses: Array, sentence: str) -> Cor
     Returns:
         `converged`; `not_finite`, and what was observed, if a number is not finite.
     """
-    before = largest_gap(observation.assembly, observation.start, observation.poses)
+    before = measure_largest_gap(observation.assembly, observation.start, observation.poses)
     if not np.isfinite(poses).all():
-        return Correction(observation.poses, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    e, J = contact_equations(observation.assembly, observation.start, poses).linearise(poses)
-    _, rank = least_step(J / np.tile(TWIST_UNITS, len(poses)), e, SINGULAR_CUT_OFF)
+        return Correction(
+            observation.poses, "not_finite", outcomes.describe_outcome("not_finite"), (), before, before, 0
+        )
+    e, J = build_contact_equations(observation.assembly, observation.start, poses).linearise(poses)
+    _, rank = compute_least_step(J / np.tile(TWIST_UNITS, len(poses)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((poses != observation.poses).any(axis=(1, 2)))[::-1])
-    after = largest(e)
+    after = find_largest_residual(e)
     sentence = status_sentence("converged", observation.gap_m) if after <= observation.gap_m else sentence
     return Correction(poses, "converged", sentence, freed, before, after, rank)
 
@@ -40,9 +55,11 @@ def gap_of(observation: Observation, poses: Array, dropped: Collection[str] = ()
         dropped: Relations, or single contacts, that do not count.
     """
     observation = project_observation(observation)
-    plain = contact_equations(observation.assembly, observation.start, observation.poses)
-    system, exact, inequalities = demands_of(plain, observation.assembly, observation.play_m)
-    return largest(violations(system, exact, inequalities, poses)[observation.assembly.without(dropped)])
+    plain = build_contact_equations(observation.assembly, observation.start, observation.poses)
+    system, exact, inequalities = list_contact_demands(plain, observation.assembly, observation.play_m)
+    return find_largest_residual(
+        compute_violations(system, exact, inequalities, poses)[observation.assembly.without(dropped)]
+    )
 
 
 def run_method(observation: Observation, method: Callable[[Observation], Array], done: str) -> Correction:
@@ -58,5 +75,5 @@ def run_method(observation: Observation, method: Callable[[Observation], Array],
     if not observation.observed.all():
         return refuse_correction(observation)
     poses = method(observation) if observation.assembly.relations() else observation.poses
-    left_m = largest_gap(observation.assembly, observation.start, poses)
+    left_m = measure_largest_gap(observation.assembly, observation.start, poses)
     return poses_as_given(observation, poses, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

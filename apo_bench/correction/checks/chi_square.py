@@ -10,9 +10,9 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from apo_bench.assembly import Assembly, contact_pattern
-from apo_bench.correction.solvers import SMALLEST, plays
-from apo_bench.geometry import Array, frozen, remembered
+from apo_bench.assembly import Assembly, find_contact_pattern
+from apo_bench.correction.solvers import SMALLEST, count_plays
+from apo_bench.geometry import Array, copy_frozen, remember
 
 TEST_LEVEL = 0.01
 """False alarms that are accepted."""
@@ -23,15 +23,15 @@ CONTRADICTION_M = 0.05e-3
 if no compact equation, which counts sqrt(v) times at the centre of v vertices, is off by more."""
 
 
-@remembered
+@remember
 def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     """The standard deviation of each compact equation, (3 c,), [m]: a contact that fits is uniform within its play.
 
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
-    count, unit_m = plays(assembly, play_m)
-    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(contact_pattern(assembly).begin))
-    return frozen(np.repeat(each, 3))
+    count, unit_m = count_plays(assembly, play_m)
+    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(find_contact_pattern(assembly).begin))
+    return copy_frozen(np.repeat(each, 3))
 
 
 def p_value(chi_square: float, degrees: int) -> float:

@@ -5,7 +5,7 @@ from math import inf
 
 import numpy as np
 
-from apo_bench.assembly import SCHEDULE_REMEDY, Assembly, Correction, Observation, schedule_fault
+from apo_bench.assembly import SCHEDULE_REMEDY, Assembly, Correction, Observation, find_schedule_fault
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 from apo_bench.io import UNSHOWN
@@ -80,7 +80,7 @@ def check_correction(correction: Correction, assembly: Assembly, name: str) -> N
     for one in correction.dropped:
         known = not assembly.without((one,)).all()
         require(known, f"{made} {one!r} in `dropped`; return a tuple of relations, such as 'R1'.")
-    wrong = schedule_fault(correction.schedule, n) if correction.schedule else ""
+    wrong = find_schedule_fault(correction.schedule, n) if correction.schedule else ""
     require(not wrong, f"{made} a schedule that {wrong}; {SCHEDULE_REMEDY}.")
     if correction.step_poses is None:
         return

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, faces_away, largest_gap
+from apo_bench.assembly import Correction, Observation, find_faces_away, measure_largest_gap
 from apo_bench.correction.solvers import Solution
 from apo_bench.records import outcomes
 
@@ -24,7 +24,7 @@ def solver_status(solution: Solution, left_m: float, gap_m: float) -> str:
 
 def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str:
     """What a status means; `of` says which contacts were looked at."""
-    return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
+    return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.describe_outcome(status)
 
 
 def check_facing(observation: Observation, correction: Correction) -> Correction:
@@ -32,7 +32,7 @@ def check_facing(observation: Observation, correction: Correction) -> Correction
     if not correction.ok:
         return correction
     assembly = observation.assembly
-    away = faces_away(assembly, observation.start, correction.poses)
+    away = find_faces_away(assembly, observation.start, correction.poses)
     if correction.dropped:
         away &= assembly.without(correction.dropped)
     if not away.any():
@@ -47,5 +47,7 @@ def check_facing(observation: Observation, correction: Correction) -> Correction
 def refuse_correction(observation: Observation) -> Correction:
     """What was observed, unchanged: an operation without a pose has no motion parameter to start from."""
     missing = int(np.argmin(observation.observed))
-    now = largest_gap(observation.assembly, observation.start, observation.poses)
-    return Correction(observation.poses, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)
+    now = measure_largest_gap(observation.assembly, observation.start, observation.poses)
+    return Correction(
+        observation.poses, "not_seen", outcomes.describe_outcome("not_seen", operation=missing), (), now, now, 0
+    )

@@ -37,19 +37,30 @@ DROPS = 3
 @check_arguments
 @dataclass(frozen=True)
 class ContactCorrector:
-    """Nearest consistent poses; what to do if the test of the correction fails is said beforehand."""
+    """The corrector `contact`: the most likely poses that satisfy every contact, tested against the stated noise.
+
+    Call it with an `Observation`; it returns a `Correction`. Source: `docs/how/contact.md`.
+
+    Examples:
+        >>> import apo_bench
+        >>> strict = apo_bench.ContactCorrector(doubt="refuse", level=0.05)
+        >>> table = apo_bench.evaluate(
+        ...     {"strict": strict}, scenario="block_on_block", seeds=1, fidelity="near-contact"
+        ... )
+        >>> table.rows[0]["rate"]
+        1.0
+    """
 
     doubt: Doubt = "warn"
-    """`apply` says nothing, `warn` names the suspects and goes on, `refuse` does not go on (status `doubtful`), and
-    `drop` leaves the most suspect relation out, or one contact of it if that is enough, up to three in turn, until the
-    test passes."""
+    """What to do if the test fails. `apply`: nothing. `warn`: name the suspect relations. `refuse`: end with status
+    `doubtful`. `drop`: leave out the most suspect relation, or one contact of it, up to three in turn, until the test
+    passes."""
     level: float = TEST_LEVEL
-    """The test fails if the p-value is below: the share of false alarms."""
+    """The test fails if the p-value is below this; it is the share of false alarms."""
     elsewhere: bool = True
-    """Whether other starts are tried where what was observed leads to no solution, or far."""
+    """Whether to try other starts where the observed poses lead to no solution, or to a distant one."""
     compiled: bool = True
-    """Whether kernels are used where Numba is installed and can keep what it compiles: the same poses but for
-    rounding."""
+    """Whether to use the kernels of the extra `fast`: the same poses up to rounding."""
 
     def __post_init__(self) -> None:
         require(

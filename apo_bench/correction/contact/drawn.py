@@ -8,10 +8,10 @@ Application", 1997, Section 4.2).
 
 import numpy as np
 
-from apo_bench.assembly import Observation, joint_covariance
+from apo_bench.assembly import Observation, compute_joint_covariance
 from apo_bench.correction.checks.chi_square import ROUNDING
 from apo_bench.correction.solvers import (
-    coordinates_of,
+    whiten_twists,
 )
 from apo_bench.geometry import Array
 
@@ -24,7 +24,7 @@ def drawn_chi_squares(
     """Squared lengths of corrections of errors that are drawn, (DRAWS,), sorted.
 
     Args:
-        L: As of `noise_factor`.
+        L: As of `factor_noise`.
         Jt: (6 n, 3 c), the transposed derivative of the equations by z, at a solution.
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
         left_out: Operations whose poses are inferred, so that they agree with their contacts.
@@ -56,7 +56,7 @@ def _draw(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) ->
     """z of errors, (DRAWS, 6 n); of operations that are left out of none."""
     if observation.tails is None:
         raise ValueError("the observation states no tails")
-    joint = joint_covariance(observation.poses, observation.covariance, observation.shared)
+    joint = compute_joint_covariance(observation.poses, observation.covariance, observation.shared)
     twists = observation.tails.draws(joint, DRAWS)
     twists[:, list(left_out)] = 0.0
-    return coordinates_of(L, twists)
+    return whiten_twists(L, twists)

@@ -12,8 +12,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Observation, contact_kind, contact_pattern, product
-from apo_bench.geometry import Array, pose, quarter_turns, remembered
+from apo_bench.assembly import Assembly, Contact, Observation, classify_contact, evaluate_odl, find_contact_pattern
+from apo_bench.geometry import Array, list_quarter_turns, pose, remember
 
 _APART = 0.1
 """Normals with a smaller singular value are in one plane, or along one line."""
@@ -97,7 +97,7 @@ def infer_poses(observation: Observation, unknown: Collection[int]) -> InferredP
     return InferredPoses(poses, tuple(sorted(baseless)))
 
 
-@remembered
+@remember
 def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
     """The faces of every contact, in the order of `relations()`; None of contacts of sheets that add nothing.
 
@@ -124,7 +124,7 @@ def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
 
 def _round_ends(assembly: Assembly, contact: Contact, stated: Contact) -> Ends | None:
     """What a contact of sheets tells of that of round faces; of cones the one that says where they sit tells all."""
-    kind = contact_kind(*map(assembly.face_of, stated))
+    kind = classify_contact(*map(assembly.face_of, stated))
     ends = _flat_ends(assembly, contact)
     own = {of.part: of.face for of in stated}
     a, b = (assembly.solids[of.part].rounds.get(own[of.part]) for of in contact)
@@ -143,13 +143,13 @@ def _conditions(assembly: Assembly, start: Array, poses: Array, k: int, left: Co
     stack = np.concatenate([start, poses])
     conditions = list[_Condition]()
     others = {p + other for other in left if other != k}
-    for word, ends in zip(contact_pattern(assembly).words, contact_ends(assembly), strict=True):
+    for word, ends in zip(find_contact_pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
         if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue
         j = letters.index(p + k)
-        before = pose.inverse(product(word[:j], stack))
-        behind = product(word[j + 1 :], stack)
+        before = pose.inverse(evaluate_odl(word[:j], stack))
+        behind = evaluate_odl(word[j + 1 :], stack)
         inverse = word[j].inverse
         a = before[:3, :3] @ ends.directions[0], pose.apply(before, ends.middles[0][None])[0]
         b = behind[:3, :3] @ ends.directions[1], pose.apply(behind, ends.middles[1][None])[0]
@@ -245,7 +245,7 @@ def _fit(own: Array, way: Array, beside: Array, seen: Array) -> Array:
     # One direction leaves the turn about it: of the quarter turns of the other part the nearest one is taken.
     rank = _directions(own)
     if rank == 1:
-        square = beside @ quarter_turns()
+        square = beside @ list_quarter_turns()
         square = square[square @ own[0] @ way[0] > _SAME_WAY]
         if len(square):
             return np.asarray(square[np.einsum("kij,ij->k", square, seen).argmax()])

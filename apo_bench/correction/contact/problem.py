@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Observation, contact_equations, contact_pattern
+from apo_bench.assembly import Assembly, Observation, build_contact_equations, find_contact_pattern
 from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
     CompactEquations,
@@ -21,16 +21,16 @@ from apo_bench.correction.solvers import (
     NearestPoses,
     ProjectedContacts,
     bound_contacts,
-    compact_equations,
-    correction_to,
+    build_compact_equations,
+    factor_covariance,
+    factor_noise,
     fit_covariance,
-    noise_factor,
     project_vertices,
-    scales,
     solve_batch,
+    whiten_poses,
 )
 from apo_bench.correction.solvers.kernels import kernels
-from apo_bench.geometry import Array, remembered
+from apo_bench.geometry import Array, remember
 
 
 class _Demands(NamedTuple):
@@ -167,23 +167,21 @@ def problem_of(
     laid = project_vertices(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
     if not demands.all_exact:
-        systems = (contact_equations(assembly, first.start, T) for T in there)
+        systems = (build_contact_equations(assembly, first.start, T) for T in there)
         inequalities = tuple(bound_contacts(system, demands.exact, demands.low, demands.high) for system in systems)
-    L = np.array([noise_factor(observation) for observation in observations]) if shared else _factors(observations)
+    L = np.array([factor_noise(observation) for observation in observations]) if shared else _factors(observations)
     begin = (
-        None
-        if at is None
-        else np.array([correction_to(*observation) for observation in zip(poses, L, at, strict=True)])
+        None if at is None else np.array([whiten_poses(*observation) for observation in zip(poses, L, at, strict=True)])
     )
     return Problem(tuple(observations), poses, L, laid, demands, inequalities, level, by, begin)
 
 
-@remembered
+@remember
 def _demands(assembly: Assembly, play_m: float) -> _Demands:
     """What is asked of the contacts of an assembly whose parts fit with this play, [m]."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
-    plane = np.array(contact_pattern(assembly).plane)
+    plane = np.array(find_contact_pattern(assembly).plane)
     plane[:, 3] -= np.where(exact, low, 0.0)
     slack_m = fit_deviation(assembly, play_m)
     return _Demands(
@@ -206,11 +204,11 @@ def _factors(observations: Sequence[Observation]) -> Array:
             return L
     except np.linalg.LinAlgError:
         pass
-    return np.array([scales(observation.covariance) for observation in observations])
+    return np.array([factor_covariance(observation.covariance) for observation in observations])
 
 
 def seen_system(observation: Observation) -> CompactEquations:
     """The equations of every contact, each vertex where it was observed."""
-    return compact_equations(
-        contact_equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
+    return build_compact_equations(
+        build_contact_equations(observation.assembly, observation.start, observation.poses), len(observation.poses)
     )

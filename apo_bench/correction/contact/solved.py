@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, largest
+from apo_bench.assembly import Consistency, find_largest_residual
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.contact.squared_length import chi_square_test, chi_squares, relaxed_chi_square
 from apo_bench.correction.solvers import (
     NearestPoses,
-    active_rank,
-    marginals,
-    nearest_between,
-    projections,
+    compute_marginals,
+    compute_projections,
+    count_active_directions,
+    find_nearest_between,
 )
 from apo_bench.geometry import Array
 
@@ -114,8 +114,8 @@ def _describe(
     far = turned_far(problem.poses, poses).tolist()
     at_rest = nearest.at_rest.tolist()
     finite = nearest.finite.tolist()
-    rank, free_projection = projections(nearest.Jt)
-    covariance = [None] * len(rank) if free_projection is None else marginals(nearest.B, free_projection)
+    rank, free_projection = compute_projections(nearest.Jt)
+    covariance = [None] * len(rank) if free_projection is None else compute_marginals(nearest.B, free_projection)
     tests = [Consistency(x, r, p_value(x, r), problem.level) for x, r in zip(chi_square, rank, strict=True)]
     before = poses, nearest.z, at_rest, finite, nearest.trace, tests
     return [
@@ -133,14 +133,14 @@ def _describe_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: Neares
     exact = problem.demands.exact
     chosen = kept & exact
     chi_square, degrees = relaxed_chi_square(problem, chosen, nearest)
-    if nearest.finite[0] and largest(problem.gaps(nearest.poses)[:, chosen]) > problem.observation.gap_m:
+    if nearest.finite[0] and find_largest_residual(problem.gaps(nearest.poses)[:, chosen]) > problem.observation.gap_m:
         nearest = problem.nearest(chosen, np.hypot(problem.slack(chosen), CONTRADICTION_M))
     elif nearest.finite[0] and not exact[kept].all():
         inequalities = problem.inequalities[0].among(kept[~exact])
         start = nearest.at(0)
-        held = nearest_between(problem.among(chosen).only(0), inequalities, problem.poses[0], problem.L[0], start)
+        held = find_nearest_between(problem.among(chosen).only(0), inequalities, problem.poses[0], problem.L[0], start)
         chi_square += float(held.z @ held.z - start.z @ start.z)
-        degrees += active_rank(start.Jt, inequalities, held)
+        degrees += count_active_directions(start.Jt, inequalities, held)
         nearest = held.batch()
     (solved,) = _describe(problem, kept, nearest, [chi_square])
     return solved._replace(test=chi_square_test(problem, chosen, nearest, chi_square, degrees))

@@ -7,13 +7,13 @@ deviations of its own, counts with z.
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Consistency, largest
+from apo_bench.assembly import Consistency, find_largest_residual
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, p_value, soft_chi_square
 from apo_bench.correction.contact.drawn import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers import (
     NearestPoses,
-    jacobian_rank,
+    compute_jacobian_rank,
 )
 from apo_bench.geometry import Array
 
@@ -39,7 +39,7 @@ def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: Nea
     Where contacts contradict each other, or fit with play, the solver runs once more, with a standard deviation for
     each equation, and the squares of what is left of the equations, in that unit, are added.
     """
-    degrees = jacobian_rank(nearest.Jt[0])
+    degrees = compute_jacobian_rank(nearest.Jt[0])
     if not nearest.finite[0]:
         return np.inf, degrees
     (chi_square,), (simple,) = chi_squares(problem, chosen, nearest)
@@ -47,7 +47,9 @@ def relaxed_chi_square(problem: Problem, chosen: NDArray[np.bool_], nearest: Nea
         return float(chi_square), degrees
     slack_m = problem.slack(chosen)
     soft = (
-        slack_m if nearest.at_rest[0] and largest(nearest.e) <= CONTRADICTION_M else np.hypot(slack_m, CONTRADICTION_M)
+        slack_m
+        if nearest.at_rest[0] and find_largest_residual(nearest.e) <= CONTRADICTION_M
+        else np.hypot(slack_m, CONTRADICTION_M)
     )
     relaxed = problem.nearest(chosen, soft)
     softened = soft > 0.0

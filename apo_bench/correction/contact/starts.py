@@ -10,20 +10,20 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly import contact_pattern, faces_away, largest
+from apo_bench.assembly import find_contact_pattern, find_faces_away, find_largest_residual
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
 from apo_bench.correction.solvers import (
     LARGEST_DENSE,
     LARGEST_POSTERIOR,
-    correction_to,
     descend_to_nearest,
-    nearest_poses,
+    factor_covariance,
+    find_nearest_poses,
     project_vertices,
-    scales,
+    whiten_poses,
 )
-from apo_bench.geometry import Array, symmetries
+from apo_bench.geometry import Array, find_symmetries
 
 _SHORTER = 1.0 - 1e-6
 """Squared lengths of two corrections differ if their ratio is below: the rest is rounding."""
@@ -75,12 +75,12 @@ def _holds(problem: Problem, solved: Solved) -> bool:
 
 def _faces_oppose(problem: Problem, *poses: Array) -> bool:
     """Whether the faces of every contact look at each other, at each of some poses."""
-    return not faces_away(problem.observation.assembly, problem.observation.start, np.array(poses)).any()
+    return not find_faces_away(problem.observation.assembly, problem.observation.start, np.array(poses)).any()
 
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the poses are: seen edge-on, they lie on one line."""
-    return largest(_begun_at(problem, solved.poses).gaps(solved.poses[None])) <= problem.observation.gap_m
+    return find_largest_residual(_begun_at(problem, solved.poses).gaps(solved.poses[None])) <= problem.observation.gap_m
 
 
 def _begun_at(problem: Problem, poses: Array) -> Problem:
@@ -96,11 +96,11 @@ def _starts(problem: Problem, first: Solved) -> Array:
     starts = [infer_poses(observation, some).poses for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.poses]
     for k in doubted:
-        for g in symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
+        for g in find_symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
             poses = np.array(observation.poses)
             poses[k] = poses[k] @ g
             turned.append(poses)
-    away = faces_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
+    away = find_faces_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
     return np.array([*starts, *(poses for poses, count in zip(turned, away, strict=True) if count < away[0])])
 
 
@@ -110,9 +110,9 @@ def _find_doubtful(problem: Problem, first: Solved) -> Collection[int]:
     n = len(problem.observation.poses)
     if n <= _MOST:
         return range(n)
-    bad = faces_away(observation.assembly, observation.start, first.poses)
+    bad = find_faces_away(observation.assembly, observation.start, first.poses)
     bad |= ~(first.gaps <= observation.gap_m)
-    letters = contact_pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
+    letters = find_contact_pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
     turned = np.einsum("nij,nij->n", observation.poses[:, :3, :3], first.poses[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
@@ -122,24 +122,24 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     """Poses, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
     observation = problem.observation
     (b, n, *_) = starts.shape
-    L = scales(observation.covariance)
+    L = factor_covariance(observation.covariance)
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
     laid = project_vertices(observation.assembly, start, problem.demands.plane, starts)
     system = laid.system.among(problem.demands.exact)
-    z = correction_to(observation.poses, L, starts)
+    z = whiten_poses(observation.poses, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.poses, starts.shape)
-        results = [nearest_poses(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
+        results = [find_nearest_poses(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
     else:
         result = (system.only(i) for i in range(b))
-        results = [nearest_poses(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]
+        results = [find_nearest_poses(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]
     poses = np.concatenate([result.poses.reshape(-1, n, 4, 4) for result in results])
     rest = np.concatenate([np.atleast_1d(result.at_rest) for result in results])
     e = np.concatenate([np.atleast_2d(result.e) for result in results])
     holds = np.isfinite(poses).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
-    holds &= ~faces_away(observation.assembly, observation.start, poses).any(axis=1)
+    holds &= ~find_faces_away(observation.assembly, observation.start, poses).any(axis=1)
     # The nearest first, since only the nearest that holds is of use.
-    z = correction_to(observation.poses, problem.L[0], poses[holds])
+    z = whiten_poses(observation.poses, problem.L[0], poses[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield poses[i]

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Observation, contact_pattern
+from apo_bench.assembly import Observation, find_contact_pattern
 from apo_bench.correction.checks.chi_square import p_value
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
@@ -19,7 +19,7 @@ from apo_bench.correction.robust.hypotheses import (
     soften,
     untrusted_operations,
 )
-from apo_bench.correction.solvers import jacobian_rank, linearise_by, noise_factor
+from apo_bench.correction.solvers import compute_jacobian_rank, factor_noise, linearise_by
 
 _LEVER_M = 0.1
 """What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
@@ -34,7 +34,7 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], assum
     left_out = untrusted_operations(states)
     wide = np.array(assumed.covariance)
     wide[list(left_out)] = ROOM
-    e, Jt = linearise_by(seen_system(assumed), assumed.poses, noise_factor(replace(assumed, covariance=wide)))
+    e, Jt = linearise_by(seen_system(assumed), assumed.poses, factor_noise(replace(assumed, covariance=wide)))
     _, soft = soften(assumed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)
@@ -58,11 +58,11 @@ class ContactAgreement:
         seen = assumed_observation(case, states)
         self._unknown = untrusted_operations(states)
         system = seen_system(seen)
-        self._e, self._Jt = linearise_by(system, seen.poses, noise_factor(seen))
+        self._e, self._Jt = linearise_by(system, seen.poses, factor_noise(seen))
         # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
-        letters = contact_pattern(seen.assembly).letters - len(seen.assembly.solids)
+        letters = find_contact_pattern(seen.assembly).letters - len(seen.assembly.solids)
         c = len(system)
         self._uses = (letters[..., None] == np.arange(len(seen.poses))).any(axis=1)
         # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.
@@ -75,7 +75,7 @@ class ContactAgreement:
         if p_value(self._alone[kept].max(initial=0.0), 3 * len(kept)) == 0.0:
             return 0.0
         rows = np.repeat(kept, 3)
-        return p_value(self._square(rows), jacobian_rank(self._Jt[:, rows]))
+        return p_value(self._square(rows), compute_jacobian_rank(self._Jt[:, rows]))
 
     def disagreement(self) -> float:
         """The squared length of what all that is assumed leaves, in standard deviations."""

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import betaln
 
 from apo_bench.assembly import OutlierModel
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 
 INLIER = 0
 BROAD = 1
@@ -29,9 +29,9 @@ States = tuple[State, ...]
 """Those of the views of each operation."""
 SHIFT_M = 0.04
 """Standard deviation of what is too near or too far, [m]."""
-VIEW = frozen(np.diag(np.repeat([0.02, np.radians(5.0)], 3) ** 2))
+VIEW = copy_frozen(np.diag(np.repeat([0.02, np.radians(5.0)], 3) ** 2))
 """(6, 6), of what displaces several operations together, about their middle, [m, rad]."""
-ROOM = frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
+ROOM = copy_frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
 """(6, 6): a Gaussian as dense in its middle as poses anywhere in half a metre, turned anyhow, are; [m, rad]."""
 _SURE_OF_RATE = 5.0
 """The rate of gross observations that is stated counts like so many operations."""
@@ -70,7 +70,7 @@ def alternatives(view: Sighting) -> list[int]:
     return [INLIER, BROAD, GROSS, SHIFTED, *stale, *range(FLIPPED, FLIPPED + len(view.flips))]
 
 
-def reading(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Array]:
+def interpret_view(view: Sighting, belief: int, model: OutlierModel) -> tuple[Array, Array]:
     """What a view that is assumed so says of the pose: a pose, (4, 4), and its covariance, (6, 6)."""
     if belief == BROAD:
         return view.goal, view.covariance * model.times**2

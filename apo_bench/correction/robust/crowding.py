@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, measure_round, placements
+from apo_bench.assembly import Observation, compute_placements, measure_round
 from apo_bench.correction.solvers import settle_basis
-from apo_bench.geometry import Array, Face, RoundFace, face_area, intrusion, overlap_area, pose
+from apo_bench.geometry import Array, Face, RoundFace, compute_overlap_area, measure_face_area, measure_intrusion, pose
 
 PLACES_TRIED = 24
 LEAST_PLACES = 8
@@ -46,7 +46,7 @@ def crowding(observation: Observation, poses: Array, best: Crowding | None = Non
         None if that is worse than `best`, as soon as that is known.
     """
     assembly = observation.assembly
-    at = placements(assembly, observation.start, poses)
+    at = compute_placements(assembly, observation.start, poses)
     missed = 0
     bare = 0.0
     for operation, placed in zip(assembly.operations, at, strict=True):
@@ -62,7 +62,7 @@ def crowding(observation: Observation, poses: Array, best: Crowding | None = Non
         for part in operation.moves:
             for other in assembly.solids:
                 if other not in operation.moves and frozenset((part, other)) not in touching:
-                    deep = intrusion(assembly.solids[part], placed[part], assembly.solids[other], placed[other])
+                    deep = measure_intrusion(assembly.solids[part], placed[part], assembly.solids[other], placed[other])
                     depth += deep if deep > _DEEP_M else 0.0
         if best is not None and (missed, depth) > best[:2]:
             return None
@@ -72,7 +72,7 @@ def crowding(observation: Observation, poses: Array, best: Crowding | None = Non
 def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
     """How much of the smaller of two faces that touch covers the other one, 0 to 1; of round ones, of their length."""
     if isinstance(a, Face) and isinstance(b, Face):
-        return overlap_area(a, T_a, b, T_b) / min(face_area(a), face_area(b))
+        return compute_overlap_area(a, T_a, b, T_b) / min(measure_face_area(a), measure_face_area(b))
     return measure_round(a, T_a, b, T_b).share
 
 

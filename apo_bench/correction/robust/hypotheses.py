@@ -21,8 +21,8 @@ from apo_bench.assembly import (
     Observation,
     OutlierModel,
     SharedError,
-    contact_pattern,
-    faces_away,
+    find_contact_pattern,
+    find_faces_away,
 )
 from apo_bench.correction.checks.chi_square import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
@@ -39,14 +39,14 @@ from apo_bench.correction.robust.noise_scale import (
     scaled_test,
 )
 from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merge_views
-from apo_bench.correction.solvers import jacobian_rank, linearise_by, noise_factor
-from apo_bench.geometry import Array, frozen, pose, right_jacobian
+from apo_bench.correction.solvers import compute_jacobian_rank, factor_noise, linearise_by
+from apo_bench.geometry import Array, compute_right_jacobian, copy_frozen, pose
 
 as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
 """Parts that are assumed to be turned by less (a standard deviation) are not far from the observed ones: no other start
 is tried, and what is far nevertheless is an outlier."""
-UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
+UNKNOWN = copy_frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
 """(6, 6): how far the pose of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 _WRONG_M = 0.05
 """Faces that a wrong relation names may be so far apart."""
@@ -120,8 +120,8 @@ class SolvedHypothesis:
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
         xi = pose.log(pose.inverse(observation.poses) @ correction.poses)
-        L = noise_factor(replace(observation, covariance=wide))
-        _, Jt = linearise_by(system, correction.poses, right_jacobian(xi) @ L)
+        L = factor_noise(replace(observation, covariance=wide))
+        _, Jt = linearise_by(system, correction.poses, compute_right_jacobian(xi) @ L)
         wrong, soft = soften(observation, self.dropped)
         false = np.where(wrong, system.residual(correction.poses) / soft, 0.0) if self.dropped else np.zeros(len(soft))
         S = Jt.T @ Jt + np.diag(soft * soft)
@@ -173,7 +173,7 @@ class SolvedHypothesis:
     def stands_at(self, poses: Array) -> bool:
         """Whether the faces of every contact that is assumed look at each other at the poses, (n, 4, 4)."""
         observation = self.observation
-        away = faces_away(observation.assembly, observation.start, poses)
+        away = find_faces_away(observation.assembly, observation.start, poses)
         return not (away & observation.assembly.without(self.dropped)).any()
 
     def _faces_oppose(self) -> bool:
@@ -211,7 +211,7 @@ def soften(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[
     if not dropped:
         return np.zeros(len(soft), dtype=np.bool_), soft
     wrong = np.repeat(~observation.assembly.without(dropped), 3)
-    each = np.repeat(np.sqrt(np.diff(contact_pattern(observation.assembly).begin)), 3) * _WRONG_M
+    each = np.repeat(np.sqrt(np.diff(find_contact_pattern(observation.assembly).begin)), 3) * _WRONG_M
     return wrong, np.where(wrong, each, soft)
 
 
@@ -243,12 +243,12 @@ def retest(assumed: Observation, correction: Correction, left_out: tuple[int, ..
     n = len(correction.poses)
     own = linearise_by(system, correction.poses, np.tile(np.eye(6), (n, 1, 1)))[1]
     own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
-    freedom = max(0, correction.test.freedom - jacobian_rank(own))
+    freedom = max(0, correction.test.freedom - compute_jacobian_rank(own))
     p = p_value(correction.test.chi_square, freedom)
     if assumed.tails is not None and freedom:
-        L = noise_factor(assumed)
+        L = factor_noise(assumed)
         xi = pose.log(pose.inverse(assumed.poses) @ correction.poses)
-        _, Jt = linearise_by(system, correction.poses, right_jacobian(xi) @ L)
+        _, Jt = linearise_by(system, correction.poses, compute_right_jacobian(xi) @ L)
         play = problem_of((assumed,)).play_covariance(kept)
         drawn = drawn_chi_squares(assumed, L, Jt, play, left_out)
         p = drawn_p_value(drawn, correction.test.chi_square)

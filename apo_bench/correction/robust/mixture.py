@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.assembly import Hypothesis
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 _APART = 22.5
 """Squared difference of two poses, in standard deviations of both, beyond which hypotheses are different modes: with
@@ -41,7 +41,7 @@ def mode_covariance(hypotheses: Sequence[Hypothesis]) -> Array | None:
         if (np.einsum("ki,ki->k", off, np.linalg.solve(both, off[..., None])[..., 0]) > _APART).any():
             continue
         # T_one exp(x) = T_first exp(off) exp(x) is T_first exp(off + A x), with A the inverse of J_r(off).
-        A = np.linalg.inv(right_jacobian(off))
+        A = np.linalg.inv(compute_right_jacobian(off))
         second += one.weight * (A @ one.covariance @ np.swapaxes(A, 1, 2) + off[:, :, None] * off[:, None, :])
         total += one.weight
     return np.asarray(second / total)

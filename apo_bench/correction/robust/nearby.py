@@ -16,9 +16,9 @@ from apo_bench.correction.robust.beliefs import (
     State,
     States,
     alternatives,
+    interpret_view,
     is_false,
     log_volume,
-    reading,
     says_nothing,
     surprise,
     swapped_with,
@@ -59,7 +59,7 @@ def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting
     for belief in (*rest, BROAD):
         unlikely = surprise((view,), (belief,), case.model)
         if not says_nothing(belief):
-            T, own = reading(view, belief, case.model)
+            T, own = interpret_view(view, belief, case.model)
             apart = pose.log(pose.inverse(without.correction.poses[k]) @ T)
             total = known + own
             unlikely += float(apart @ np.linalg.solve(total, apart)) + log_volume(total) - log_volume(ROOM)

@@ -15,7 +15,7 @@ from apo_bench.assembly import (
     Observation,
     OutlierModel,
     Reobserver,
-    largest_gap,
+    measure_largest_gap,
     project_observations,
 )
 from apo_bench.correction.checks.chi_square import TEST_LEVEL
@@ -165,7 +165,7 @@ def _report(
     correction = best.correction
     if not best.doubts and not again:
         return replace(correction, sentence=correction.sentence + _describe_misfit(best))
-    before = largest_gap(observation.assembly, observation.start, observation.poses)
+    before = measure_largest_gap(observation.assembly, observation.start, observation.poses)
     hypotheses = _hypotheses(search, best)
     return replace(
         correction,

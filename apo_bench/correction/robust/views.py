@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, OutlierModel, placements
+from apo_bench.assembly import Observation, OutlierModel, compute_placements
 from apo_bench.correction.robust.beliefs import (
     GROSS,
     INLIER,
@@ -18,13 +18,13 @@ from apo_bench.correction.robust.beliefs import (
     STALE,
     Sighting,
     State,
+    interpret_view,
     log_volume,
-    reading,
     says_nothing,
     surprise,
     swapped_with,
 )
-from apo_bench.geometry import Array, approximate_symmetries, pose
+from apo_bench.geometry import Array, find_approximate_symmetries, pose
 
 _MOST_TOGETHER = 3
 """Of more views than this only those that agree are assumed together."""
@@ -75,7 +75,7 @@ def add_views(
             ray = to / max(float(np.linalg.norm(to)), 1e-9)
         others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.observed[i]]
         like = [i for i in others if assembly.solids[mains[i]] is assembly.solids[mains[k]]]
-        flips = approximate_symmetries(assembly.solids[mains[k]]).turns
+        flips = find_approximate_symmetries(assembly.solids[mains[k]]).turns
         seen = Sighting(T, observation.covariance[k], flips, before[k], ray, tuple(like or others) if not old else ())
         grown.append((*old, seen))
     return tuple(grown)
@@ -85,7 +85,7 @@ def _before(first: Observation) -> list[tuple[Array, Array] | None]:
     """Where the part of each operation was before it, and the covariance of that; None if that is not known."""
     now: dict[str, Array | None] = dict.fromkeys(first.start, _EXACT)
     found = list[tuple[Array, Array] | None]()
-    where = (first.start, *placements(first.assembly, first.start, first.poses)) if first.start else ()
+    where = (first.start, *compute_placements(first.assembly, first.start, first.poses)) if first.start else ()
     for k, operation in enumerate(first.assembly.operations):
         C = now.get(operation.main)
         found.append(None if C is None else (where[k][operation.main], C))
@@ -101,7 +101,7 @@ def merge_views(
     pairs = [
         (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
     ]
-    assumed = [reading(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
+    assumed = [interpret_view(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
     unlikely = surprise(views, state, model)
     anywhere = log_volume(ROOM)
     if not assumed:

@@ -1,37 +1,50 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearise_by
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestPoses, nearest_poses, solve_batch
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by
+from apo_bench.correction.solvers.gauss_newton import (
+    LARGEST_DENSE,
+    SMALLEST,
+    NearestPoses,
+    find_nearest_poses,
+    solve_batch,
+)
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
-    active_rank,
     bound_contacts,
-    demands_of,
-    nearest_between,
-    violations,
+    compute_violations,
+    count_active_directions,
+    find_nearest_between,
+    list_contact_demands,
 )
 from apo_bench.correction.solvers.kernels import Kernels
-from apo_bench.correction.solvers.newton import LENGTH_M, REST_M, SINGULAR_CUT_OFF, Solution, least_step, solve_newton
+from apo_bench.correction.solvers.newton import (
+    LENGTH_M,
+    REST_M,
+    SINGULAR_CUT_OFF,
+    Solution,
+    compute_least_step,
+    solve_newton,
+)
 from apo_bench.correction.solvers.newton_descent import descend_to_nearest
-from apo_bench.correction.solvers.play import fit_covariance, plays
+from apo_bench.correction.solvers.play import count_plays, fit_covariance
 from apo_bench.correction.solvers.posterior import (
     LARGEST_POSTERIOR,
     RANK_CUT_OFF,
     Freedom,
-    freedom_of,
-    jacobian_rank,
-    marginals,
-    projections,
+    compute_freedom,
+    compute_jacobian_rank,
+    compute_marginals,
+    compute_projections,
     settle_basis,
 )
 from apo_bench.correction.solvers.projected_contacts import ProjectedContacts, project_vertices
 from apo_bench.correction.solvers.whitened import (
-    Whitened,
-    coordinates_of,
-    correction_to,
-    noise_factor,
-    scales,
-    twists_of,
+    WhitenedPoses,
+    factor_covariance,
+    factor_noise,
+    unwhiten_twists,
+    whiten_poses,
+    whiten_twists,
 )
 
 __all__ = (
@@ -49,30 +62,30 @@ __all__ = (
     "NearestPoses",
     "ProjectedContacts",
     "Solution",
-    "Whitened",
-    "active_rank",
+    "WhitenedPoses",
     "bound_contacts",
-    "compact_equations",
-    "coordinates_of",
-    "correction_to",
-    "demands_of",
+    "build_compact_equations",
+    "compute_freedom",
+    "compute_jacobian_rank",
+    "compute_least_step",
+    "compute_marginals",
+    "compute_projections",
+    "compute_violations",
+    "count_active_directions",
+    "count_plays",
     "descend_to_nearest",
+    "factor_covariance",
+    "factor_noise",
+    "find_nearest_between",
+    "find_nearest_poses",
     "fit_covariance",
-    "freedom_of",
-    "jacobian_rank",
-    "least_step",
     "linearise_by",
-    "marginals",
-    "nearest_between",
-    "nearest_poses",
-    "noise_factor",
-    "plays",
+    "list_contact_demands",
     "project_vertices",
-    "projections",
-    "scales",
     "settle_basis",
     "solve_batch",
     "solve_newton",
-    "twists_of",
-    "violations",
+    "unwhiten_twists",
+    "whiten_poses",
+    "whiten_twists",
 )

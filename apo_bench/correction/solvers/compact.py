@@ -122,7 +122,7 @@ class CompactEquations:
         return points
 
 
-def compact_equations(system: Equations, n: int) -> CompactEquations:
+def build_compact_equations(system: Equations, n: int) -> CompactEquations:
     """Equations in compact form: three per contact, in the motion parameters of `n` operations."""
     words = Words(system.letters, system.inverse, len(system.start), n)
     plane = np.zeros((len(words), 4))

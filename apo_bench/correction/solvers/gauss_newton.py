@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.kernels import Kernels
-from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, turn_of
+from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, measure_largest_turn
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry import Array
 
@@ -81,7 +81,7 @@ class NearestPoses(NamedTuple):
         return NearestPoses(*fields)
 
 
-def nearest_poses(
+def find_nearest_poses(
     system: CompactEquations,
     poses: Array,
     L: Array,
@@ -115,7 +115,7 @@ def solve_batch(
     kernels: Kernels | None = None,
     sparse: bool | None = None,
 ) -> NearestPoses:
-    """`nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
+    """`find_nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
 
     Args:
         sparse: Whether matrices are sparse, of a batch of one without shared errors; None leaves that to its size.
@@ -212,5 +212,5 @@ def settles(size: float, before: float, sure: float = SURE, following: float = N
 
 def shortened_step(step: Array, L: Array) -> Array:
     """A step (6 n,), shortened if a pose would turn further than `LARGEST_TURN`."""
-    (angle,) = turn_of(step[None], L[None]).tolist()
+    (angle,) = measure_largest_turn(step[None], L[None]).tolist()
     return step * (LARGEST_TURN / angle) if angle > LARGEST_TURN else step

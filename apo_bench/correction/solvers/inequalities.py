@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Equations, project_round_faces
 from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestPoses, damping, settles, shortened_step
-from apo_bench.correction.solvers.linear_step import poses_at, shortest_z
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
+from apo_bench.correction.solvers.linear_step import compute_poses_at, shortest_z
+from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, compute_jacobian_rank
 from apo_bench.correction.solvers.whitened import pull_back
 from apo_bench.errors import require
 from apo_bench.geometry import Array
@@ -67,7 +67,7 @@ class Inequalities:
         return worst
 
 
-def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, poses: Array) -> Array:
+def compute_violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, poses: Array) -> Array:
     """The largest |e| of each contact that is an equation, (c,), [m]; or how far an inequality is violated."""
     gaps = system.gaps(poses)
     if len(inequalities):
@@ -75,7 +75,7 @@ def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequa
     return gaps
 
 
-def demands_of(
+def list_contact_demands(
     system: Equations, assembly: Assembly, play_m: float
 ) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
@@ -95,14 +95,14 @@ def bound_contacts(system: Equations, exact: NDArray[np.bool_], low: Array, high
     return Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact])
 
 
-def nearest_between(
+def find_nearest_between(
     system: CompactEquations, inequalities: Inequalities, observed: Array, L: Array, start: NearestPoses
 ) -> NearestPoses:
     """The nearest poses that satisfy the equations and the inequalities.
 
     Args:
         observed: (n, 4, 4), what was observed, world frame, [m].
-        L: (n, 6, 6) or (n, 6, 6 n), as of `nearest_poses`.
+        L: (n, 6, 6) or (n, 6, 6 n), as of `find_nearest_poses`.
         start: The nearest poses without inequalities.
 
     Returns:
@@ -116,7 +116,7 @@ def nearest_between(
         f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
         'ask for "centred" contacts instead.',
     )
-    known = jacobian_rank(start.Jt)
+    known = compute_jacobian_rank(start.Jt)
     before = np.inf
     trace = list(start.trace)
     pace = 1.0
@@ -145,7 +145,7 @@ def nearest_between(
         pace = _choose_pace(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
-        (T,), (B,) = poses_at(observed, L[None], z[None])
+        (T,), (B,) = compute_poses_at(observed, L[None], z[None])
         before = largest
         if over:
             break
@@ -162,7 +162,7 @@ def _shortest(e: Array, Jt: Array, z: Array) -> Array:
     return np.asarray(shortest_z(J, e[None], z[None], np.full((1, m), mu))[0])
 
 
-def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) -> int:
+def count_active_directions(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) -> int:
     """How many directions the active inequalities fix beyond the equations.
 
     Args:
@@ -171,7 +171,7 @@ def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) ->
     e, J = inequalities.system.linearise(nearest.poses)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
     J = pull_back(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
-    return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
+    return compute_jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - compute_jacobian_rank(Jt) if at.any() else 0
 
 
 def _choose_pace(pace: float, step: Array, last: Array) -> float:

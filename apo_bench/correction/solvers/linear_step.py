@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.kernels import Kernels, own
-from apo_bench.geometry import ADJOINTS, SERIES, Array, exp_and_jacobian
+from apo_bench.geometry import ADJOINTS, SERIES, Array, compute_exp_and_jacobian
 
 SURE = 1e-6
 NEXT = 1e-9
@@ -104,7 +104,7 @@ class DenseStep:
             self._kernels.linearise(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
             return
         some = self._views(rows)
-        self.T[some], self.B[some] = poses_at(self._observed[some], self._L[some], z[some])
+        self.T[some], self.B[some] = compute_poses_at(self._observed[some], self._L[some], z[some])
         e, Jt = linearise_by(self._system.only(some), self.T[some], self.B[some])
         m = max(self.e.shape[1], 1)
         self.e[some] = e
@@ -124,7 +124,7 @@ class DenseStep:
             return step, largest, angles
         some = self._views(rows)
         step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
-        return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
+        return step, np.abs(step).max(axis=1, initial=0.0), measure_largest_turn(step, self._L[some])
 
     def _views(self, rows: Rows) -> Any:
         """The same rows; a slice where that is all, which copies nothing."""
@@ -155,13 +155,13 @@ def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
     return np.asarray((Jt @ np.linalg.solve(A, wanted))[..., 0])
 
 
-def poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+def compute_poses_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
     """Poses T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
 
     Args:
         observed: (n, 4, 4) or (b, n, 4, 4); L is (b, n, 6, 6) or (b, n, 6, 6 n), and z (b, 6 n).
     """
-    D, Jr = exp_and_jacobian(twists(z, L))
+    D, Jr = compute_exp_and_jacobian(twists(z, L))
     return observed @ D, Jr @ L
 
 
@@ -171,7 +171,7 @@ def twists(z: Array, L: Array) -> Array:
     return np.asarray((L @ z.reshape(len(L), z.shape[1] // width, width, 1))[..., 0])
 
 
-def turn_of(step: Array, L: Array) -> Array:
+def measure_largest_turn(step: Array, L: Array) -> Array:
     """How far steps (b, 6 n) of z turn a pose at most, (b,), [rad]."""
     rotations = twists(step, L[:, :, 3:])
     return np.asarray(np.sqrt((rotations * rotations).sum(axis=2).max(axis=1, initial=0.0)))

@@ -21,7 +21,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Equations, Iterate, largest
+from apo_bench.assembly import Equations, Iterate, find_largest_residual
 from apo_bench.geometry import Array
 
 LENGTH_M = 0.04
@@ -83,11 +83,13 @@ def _descend(
     for iteration in range(_ITERATIONS + 1):
         e, J = equations.linearise(now)
         try:
-            step, rank = least_step(J[:, columns] / units, e, cut_off, at_most)
+            step, rank = compute_least_step(J[:, columns] / units, e, cut_off, at_most)
         except np.linalg.LinAlgError:
-            return Solution(np.array(poses), trace[0].gap_m if trace else largest(e), 0, False, False, tuple(trace))
+            return Solution(
+                np.array(poses), trace[0].gap_m if trace else find_largest_residual(e), 0, False, False, tuple(trace)
+            )
         size = float(np.linalg.norm(step))
-        trace.append(Iterate(largest(e), rank, size))
+        trace.append(Iterate(find_largest_residual(e), rank, size))
         if size < REST_M or iteration == _ITERATIONS:
             break
         # T <- T dT(dq), q <- 0: the derivatives of the appendix hold at q = 0 only.
@@ -95,7 +97,7 @@ def _descend(
     return Solution(now, trace[-1].gap_m, trace[-1].rank, size < REST_M, True, tuple(trace))
 
 
-def least_step(J: Array, e: Array, cut_off: float, at_most: int | None = None) -> tuple[Array, int]:
+def compute_least_step(J: Array, e: Array, cut_off: float, at_most: int | None = None) -> tuple[Array, int]:
     """The shortest dq with the least |J dq + e|, and the rank (Eq. 15 to 23): dq = -V W* U^t e.
 
     Raises:

@@ -11,8 +11,8 @@ import numpy as np
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
-from apo_bench.correction.solvers.linear_step import poses_at
-from apo_bench.correction.solvers.whitened import correction_to
+from apo_bench.correction.solvers.linear_step import compute_poses_at
+from apo_bench.correction.solvers.whitened import whiten_poses
 from apo_bench.geometry import Array
 
 _ITERATIONS = 30
@@ -31,7 +31,7 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
         observed: (n, 4, 4), what was observed, world frame, [m].
         L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
     """
-    z = correction_to(observed, L, poses)
+    z = whiten_poses(observed, L, poses)
     for _ in range(_ITERATIONS):
         (e,), (Jt,) = _linearise(system, observed, L, z[None])
         # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
@@ -53,9 +53,9 @@ def descend_to_nearest(system: CompactEquations, observed: Array, L: Array, pose
         z = z + shortened_step(step, L)
         if np.abs(step).max() < STEP:
             break
-    return poses_at(observed, L[None], z[None])[0][0]
+    return compute_poses_at(observed, L[None], z[None])[0][0]
 
 
 def _linearise(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
     """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
-    return linearise_by(system, *poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))
+    return linearise_by(system, *compute_poses_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, PartFace, contact_pattern
-from apo_bench.geometry import Array, frozen, remembered
+from apo_bench.assembly import Assembly, Contact, PartFace, find_contact_pattern
+from apo_bench.geometry import Array, copy_frozen, remember
 
 LARGEST_CORRELATED = 300
 """Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""
@@ -34,16 +34,16 @@ class _Shift(NamedTuple):
     """The operation after which it is asked for: that one, or one that carried the part."""
 
 
-@remembered
-def plays(assembly: Assembly, play_m: float) -> tuple[Array, float]:
+@remember
+def count_plays(assembly: Assembly, play_m: float) -> tuple[Array, float]:
     """How many independent plays each contact is off by, (c,), in the order of `relations()`, and how large one is,
     [m].
     """
     shifts, unit_m = _shifts(assembly, play_m)
-    return frozen(np.array([sum(float(n @ n) for n in own.values()) for own in shifts])), unit_m
+    return copy_frozen(np.array([sum(float(n @ n) for n in own.values()) for own in shifts])), unit_m
 
 
-@remembered
+@remember
 def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     """The covariance of the compact equations that play causes, (3 c, 3 c), [m^2]; None of too many, or without play.
 
@@ -51,7 +51,7 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     its own way.
     """
     shifts, _ = _shifts(assembly, play_m)
-    count, unit_m = plays(assembly, play_m)
+    count, unit_m = count_plays(assembly, play_m)
     if not count.any() or len(shifts) > LARGEST_CORRELATED:
         return None
     every = {
@@ -62,15 +62,15 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     for row, shifts_of_contact in zip(by, shifts, strict=True):
         for shift, n in shifts_of_contact.items():
             row[every[shift] : every[shift] + 3] = n
-    each = unit_m**2 / 3.0 * np.diff(contact_pattern(assembly).begin)
+    each = unit_m**2 / 3.0 * np.diff(find_contact_pattern(assembly).begin)
     by *= np.sqrt(each)[:, None]
     # A uniform displacement of half width u has variance u^2 / 3; rows that a displacement has a part in go together.
     S = np.diag(np.repeat(count * each, 3))
     S[::3, ::3] = by @ by.T
-    return frozen(S)
+    return copy_frozen(S)
 
 
-@remembered
+@remember
 def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array], ...], float]:
     """What each contact is off by, in the order of `relations()`: by how much, (3,), of each displacement.
 

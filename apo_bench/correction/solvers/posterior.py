@@ -46,7 +46,7 @@ class Freedom:
     """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z, by `settle_basis`."""
 
 
-def freedom_of(Jt: Any) -> Freedom | None:
+def compute_freedom(Jt: Any) -> Freedom | None:
     """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse.
 
     None above `LARGEST_POSTERIOR` unknowns.
@@ -89,7 +89,7 @@ def settle_basis(N: Array) -> Array:
     return np.asarray(N @ (U @ Vt))
 
 
-def jacobian_rank(Jt: Any) -> int:
+def compute_jacobian_rank(Jt: Any) -> int:
     """The rank alone, of a dense or a sparse matrix; from the pivots of a Cholesky factor where they are clear."""
     if not isinstance(Jt, np.ndarray):
         return sparse.sparse_rank(Jt)
@@ -108,8 +108,8 @@ def jacobian_rank(Jt: Any) -> int:
     return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
 
 
-def projections(Jt: Any) -> tuple[list[int], Array | None]:
-    """The rank of each of b transposed Jacobians at a solution, and what it leaves free, as `marginals` takes it.
+def compute_projections(Jt: Any) -> tuple[list[int], Array | None]:
+    """The rank of each of b transposed Jacobians at a solution, and the directions it leaves free.
 
     An orthonormal basis Q of what the columns of Jt span comes from its QR decomposition, the longest column that is
     left next (Businger and Golub, 1965); what is free is all else: P = 1 - Q Q^t, and cov(z) = P = P P^t. Observations
@@ -124,7 +124,7 @@ def projections(Jt: Any) -> tuple[list[int], Array | None]:
     """
     unknowns = Jt[0].shape[0]
     if unknowns > LARGEST_POSTERIOR:
-        return [jacobian_rank(matrix) for matrix in Jt], None
+        return [compute_jacobian_rank(matrix) for matrix in Jt], None
     if not isinstance(Jt, np.ndarray):
         free = sparse.free_basis(Jt[0], *UNCLEAR)
         if free is not None:
@@ -171,7 +171,7 @@ def _row_space(Jt: Array) -> tuple[Array, NDArray[np.intp]]:
     return dorgqr(QR[:, :rank], reflectors[:rank], lwork=_BLOCK * max(rank, 1))[0], order[:rank] - 1
 
 
-def marginals(B: Array, free: Array) -> Array:
+def compute_marginals(B: Array, free: Array) -> Array:
     """The posterior covariance of the body twist of each corrected pose, (b, n, 6, 6), [m, rad].
 
     Args:

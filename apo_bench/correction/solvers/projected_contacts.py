@@ -6,10 +6,10 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Pattern, contact_pattern
+from apo_bench.assembly import Assembly, Pattern, find_contact_pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
 from apo_bench.correction.solvers.word_products import Words
-from apo_bench.geometry import Array, pose, remembered
+from apo_bench.geometry import Array, pose, remember
 
 _ONE = np.eye(4)
 
@@ -39,7 +39,7 @@ class ProjectedContacts:
         return np.asarray(np.maximum.reduceat(np.abs(e), self.pattern.begin[:-1], axis=-1))
 
     def faces_away(self, forms: Array) -> NDArray[np.bool_]:
-        """Which contacts have faces that do not look at each other, (*, c), as `faces_away` has it."""
+        """Which contacts have faces that do not look at each other, (*, c), as `find_faces_away` has it."""
         return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
 
 
@@ -79,9 +79,9 @@ class _Corners(NamedTuple):
     """(c, 4, 4): the maps v -> v - n (n v) that drop points onto the face of the environment."""
 
 
-@remembered
+@remember
 def _corners(assembly: Assembly) -> _Corners:
-    known = contact_pattern(assembly)
+    known = find_contact_pattern(assembly)
     normal = np.array(known.onto)
     normal[:, 3] = 0.0
     return _Corners(

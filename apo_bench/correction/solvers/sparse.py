@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.linear_step import poses_at, turn_of
+from apo_bench.correction.solvers.linear_step import compute_poses_at, measure_largest_turn
 from apo_bench.geometry import Array
 
 WIDE = 240
@@ -114,7 +114,7 @@ class SparseStep:
         return self._system.forms(self.T)
 
     def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
-        self.T, self.B = poses_at(self._observed, self._L, z)
+        self.T, self.B = compute_poses_at(self._observed, self._L, z)
         e, every = self._system.blocks(self.T[0], self.B[0])
         self.e = e[None]
         self._blocks = every[self._where.contact, self._where.letter]
@@ -125,7 +125,7 @@ class SparseStep:
     def change(self, z: Array, mu: Array, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         wanted = self._where.times(self._blocks, z[0]) - self.e[0]
         step = self._solve(mu[0] + self._soft2, self._blocks, wanted)[None] - z
-        return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L)
+        return step, np.abs(step).max(axis=1, initial=0.0), measure_largest_turn(step, self._L)
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
         self._blocks = np.zeros_like(self._blocks)

@@ -9,14 +9,14 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Observation, joint_covariance
+from apo_bench.assembly import Observation, compute_joint_covariance
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Whitened:
+class WhitenedPoses:
     """The motion parameters of n operations as a vector z, (6 n,), that is zero at what was observed."""
 
     observed: Array
@@ -26,23 +26,23 @@ class Whitened:
 
     def poses(self, z: Array) -> Array:
         """T_seen exp(L z), (n, 4, 4)."""
-        return np.asarray(self.observed @ pose.exp(twists_of(self.factor, z)))
+        return np.asarray(self.observed @ pose.exp(unwhiten_twists(self.factor, z)))
 
     def pull_back(self, z: Array, J: Array) -> Array:
         """A derivative by the body twists of the poses at z, (m, 6 n), as the derivative by z."""
-        return pull_back(J, right_jacobian(twists_of(self.factor, z)) @ self.factor)
+        return pull_back(J, compute_right_jacobian(unwhiten_twists(self.factor, z)) @ self.factor)
 
 
-def whitened(observation: Observation) -> Whitened:
+def whitened(observation: Observation) -> WhitenedPoses:
     """The coordinates of an observation.
 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return Whitened(observation.poses, noise_factor(observation))
+    return WhitenedPoses(observation.poses, factor_noise(observation))
 
 
-def twists_of(L: Array, z: Array) -> Array:
+def unwhiten_twists(L: Array, z: Array) -> Array:
     """L z by operation: z (6 n,) -> (n, 6), or (6 n, f) -> (n, 6, f)."""
     n = len(L)
     columns = z.shape[1:]
@@ -51,7 +51,7 @@ def twists_of(L: Array, z: Array) -> Array:
     return np.asarray((L @ z.reshape(n, 6, *(columns or (1,)))).reshape(n, 6, *columns))
 
 
-def coordinates_of(L: Array, xi: Array) -> Array:
+def whiten_twists(L: Array, xi: Array) -> Array:
     """z of body twists xi = L z, (*, n, 6) -> (*, 6 n)."""
     flat = (*xi.shape[:-2], 6 * len(L))
     if L.shape[2] != 6:
@@ -68,7 +68,7 @@ def pull_back(J: Array, B: Array) -> Array:
     return np.asarray((J.reshape(m, n, 1, 6) @ B).reshape(m, 6 * n))
 
 
-def noise_factor(observation: Observation) -> Array:
+def factor_noise(observation: Observation) -> Array:
     """L of an observation, (n, 6, 6), or (n, 6, 6 n) where operations share errors.
 
     Raises:
@@ -76,10 +76,10 @@ def noise_factor(observation: Observation) -> Array:
     """
     # Errors that operations share couple them, so L is the factor of one matrix of all of them.
     if not observation.shared:
-        return scales(observation.covariance)
-    scales(observation.covariance)
+        return factor_covariance(observation.covariance)
+    factor_covariance(observation.covariance)
     n = len(observation.poses)
-    joint = joint_covariance(observation.poses, observation.covariance, observation.shared)
+    joint = compute_joint_covariance(observation.poses, observation.covariance, observation.shared)
     try:
         return np.asarray(np.linalg.cholesky(joint).reshape(n, 6, 6 * n), dtype=np.float64)
     except np.linalg.LinAlgError:
@@ -90,12 +90,12 @@ def noise_factor(observation: Observation) -> Array:
         ) from None
 
 
-def correction_to(observed: Array, L: Array, poses: Array) -> Array:
+def whiten_poses(observed: Array, L: Array, poses: Array) -> Array:
     """z of poses (*, n, 4, 4), the shortest that leads there from what was observed, (n, 4, 4): (*, 6 n)."""
-    return coordinates_of(L, pose.log(pose.inverse(observed) @ poses))
+    return whiten_twists(L, pose.log(pose.inverse(observed) @ poses))
 
 
-def scales(covariance: Array) -> Array:
+def factor_covariance(covariance: Array) -> Array:
     """L with L L^t = covariance, (n, 6, 6).
 
     Raises:

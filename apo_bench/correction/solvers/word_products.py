@@ -12,7 +12,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, remembered
+from apo_bench.geometry import Array, remember
 
 _ONE = np.eye(4)
 
@@ -101,7 +101,7 @@ class Words:
         return self.letters + self.inverse * (self.p + self.n + 1)
 
 
-@remembered
+@remember
 def _among(words: Words, contacts: bytes) -> Words:
     """As of `Words.among`: relations are left out in turn of one assembly, again and again."""
     kept = np.frombuffer(contacts, dtype=np.bool_)

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
+from apo_bench.assembly import Contact, PartFace, classify_contact, compute_geometric_play
 from apo_bench.assembly.facing import facing
 from apo_bench.errors import InputError
-from apo_bench.geometry import physical_pieces
+from apo_bench.geometry import shrink_pieces
 from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
 from apo_bench.scenario.parts.fit import with_fit
@@ -40,7 +40,7 @@ def add_clearance(
             fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
             try:
                 solid = with_fit(own.solid, {face: mm for face, mm in fit.items() if face not in own.fit})
-                physical_pieces(solid, 1e-3 * clearance_mm)
+                shrink_pieces(solid, 1e-3 * clearance_mm)
             except InputError as error:
                 notes.append(f"'{own.name}' gets no play in '{other.name}': {str(error).rstrip('.')}")
                 continue
@@ -75,6 +75,6 @@ def _tight_shafts(
     """Shafts that are as thick as the hole around them, or thicker, and the holes of such."""
     for mine, its in gaps:
         a, b = own.solid.face(mine.face), other.solid.face(its.face)
-        play_mm = 1e3 * geometric_play(a, b)
-        if contact_kind(a, b) == "shaft in hole" and -most_mm <= play_mm <= NO_PLAY_MM and not (a.fit or b.fit):
+        play_mm = 1e3 * compute_geometric_play(a, b)
+        if classify_contact(a, b) == "shaft in hole" and -most_mm <= play_mm <= NO_PLAY_MM and not (a.fit or b.fit):
             yield mine.face, -play_mm

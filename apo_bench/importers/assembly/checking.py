@@ -10,18 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Plan, contact_kind, placements
+from apo_bench.assembly import Plan, classify_contact, compute_placements
 from apo_bench.errors import InputError
-from apo_bench.geometry import extent, is_held
+from apo_bench.geometry import is_held, measure_extent
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.importers.assembly.touching import walls_without_play
 from apo_bench.io import read_bytes
 from apo_bench.records import TrialConfig
-from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
+from apo_bench.scenario import Scenario, list_nominal_operations, load_scenario, place_layout
 from apo_bench.simulation.arm_checks.placing import place_in_reach
 from apo_bench.simulation.arm_checks.plan_check import struck_by
-from apo_bench.simulation.execution import after_transfer, key_angles, moves
+from apo_bench.simulation.execution import compute_transferred_poses, plan_moves, solve_key_angles
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.run import run_trial
 
@@ -129,7 +129,7 @@ def _check(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
 def _summary(scenario: Scenario) -> str:
     assembly = scenario.assembly
     contacts = [contact for operation in assembly.operations for contact in operation.contacts]
-    kinds = Counter(str(contact_kind(*map(assembly.face_of, contact))) for contact in contacts)
+    kinds = Counter(str(classify_contact(*map(assembly.face_of, contact))) for contact in contacts)
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
     parts = len(assembly.solids) - (TABLE in assembly.solids)
     return f"{parts} parts, {len(assembly)} operations, {len(contacts)} contacts ({counts})"
@@ -143,7 +143,7 @@ def _parts(scenario: Scenario) -> Iterator[str]:
 def _starts(scenario: Scenario) -> Iterator[str]:
     for part, solid in scenario.assembly.solids.items():
         T = scenario.start[part]
-        is_on_table = abs(extent(solid.pieces, T[2, :3])[0] + T[2, 3]) <= _ON_TABLE_M
+        is_on_table = abs(measure_extent(solid.pieces, T[2, :3])[0] + T[2, 3]) <= _ON_TABLE_M
         if part not in scenario.assembly.fixed and is_on_table and not find_stance(solid, T[:3, :3]).stands:
             yield (
                 f"parts, {part}, start: '{part}' does not stand like this; give it a foot, or let it start in a "
@@ -152,14 +152,14 @@ def _starts(scenario: Scenario) -> Iterator[str]:
 
 
 def _ways(scenario: Scenario) -> Iterator[str]:
-    for k, each in enumerate(nominal_operations(scenario), start=1):
+    for k, each in enumerate(list_nominal_operations(scenario), start=1):
         if not each.after.free:
             yield f"operation {k}, contacts: no straight way leads '{each.main}' to its goal; change the order"
 
 
 def _play(scenario: Scenario) -> Iterator[str]:
     assembly = scenario.assembly
-    stages = placements(assembly, scenario.start, scenario.goals)
+    stages = compute_placements(assembly, scenario.start, scenario.goals)
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
         for contact, opposite in walls_without_play(assembly.solids, poses, operation.contacts):
             yield (
@@ -178,11 +178,11 @@ def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
                 f"operation {k}, grasp: between these pads '{operation.main}' has no opposite faces, and no shaft; "
                 "hold it elsewhere"
             )
-    layout = layout_at(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
+    layout = place_layout(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
     poses = layout.start
-    for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+    for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
         operation = scenario.assembly.operations[move.step.operation]
-        after = after_transfer(operation, move.transfer.T_world_goal, poses)
+        after = compute_transferred_poses(operation, move.transfer.T_world_goal, poses)
         depth, other = struck_by(scene, move.transfer, poses, after)
         if depth > _STRUCK_M:
             yield (
@@ -200,9 +200,9 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     places = {(0, 0, (low + high) / 2), *((i, j, low if i == j else high) for i, j in product((-1, 1), (-1, 1)))}
     for i, j, yaw in sorted(places):
         x, y = np.add(site.center_m, np.multiply((i, j), site.spread_m))
-        layout = layout_at(scenario, x, y, yaw, None, scene.clearance_mm)
-        for move in moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
-            code = key_angles(move.transfer, scene).code
+        layout = place_layout(scenario, x, y, yaw, None, scene.clearance_mm)
+        for move in plan_moves(Plan(scenario.assembly, layout.start, layout.poses), scene, False):
+            code = solve_key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and (code, part) not in known:
                 known.add((code, part))

@@ -6,7 +6,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from apo_bench.geometry import Array, Box, Solid, all_corners, intrusion_depths, passage
+from apo_bench.geometry import Array, Box, Solid, collect_corners, measure_intrusion_depths, measure_passage
 from apo_bench.importers.assembly.staging import is_carried
 from apo_bench.scenario.parts.allowed import THINNEST_M
 
@@ -33,7 +33,7 @@ def make_fixture(name: str, solid: Solid, R: Array) -> Solid:
 
     Its frame is right below that of the solid, on the table; the solid stands higher by `FLOOR_M` than on the table.
     """
-    corners = all_corners(solid.pieces)[0] @ R.T
+    corners = collect_corners(solid.pieces)[0] @ R.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     rise = FLOOR_M - low[2]
     T = np.eye(4)
@@ -68,7 +68,7 @@ def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple
     """How high the lowest point of a turned solid is above a rectangle, [m]; infinite where there is none."""
     sides = [np.linspace(a + _INSET_M, b - _INSET_M, _RAYS) for a, b in zip(begin, end, strict=True)]
     grid = np.stack([*(each.ravel() for each in np.meshgrid(*sides)), np.zeros(_RAYS**2)], axis=1)
-    return min(float(passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
+    return min(float(measure_passage(piece.planes, grid @ R, R[2])[0].min()) for piece in solid.pieces)
 
 
 def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
@@ -76,7 +76,7 @@ def _fit_height(box: Box, solid: Solid, T: Array) -> Box:
     low = (box.center - box.half)[:2]
     high = (box.center + box.half)[:2]
     for _ in range(3):
-        depth = float(intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
+        depth = float(measure_intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
         if depth <= 0.0:
             return box
         box = _box_between((*low, 0.0), (*high, 2 * max(0.0, box.half[2] - depth)))

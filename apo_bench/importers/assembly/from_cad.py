@@ -9,16 +9,16 @@ import numpy as np
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.cad.assembled import coming_near
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.places import named_places, write_places
-from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, part_name
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, clean_title, make_part_name
 
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005
 """A share of the width of the box."""
 
 
-def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
     """Write the parts of an assembly, each shape of a file once, and the place of every copy.
 
     The frame of a part is at its foot, wherever the file has its origin: a small error of an observed rotation then
@@ -48,10 +48,10 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
     folder.mkdir(parents=True, exist_ok=True)
     places: dict[str, list[SolidPlace]] = {}
     for (file_name, raw), others in zip(found, coming_near([raw for _, raw in found]), strict=True):
-        name = part_name(raw.name, places)
+        name = make_part_name(raw.name, places)
         foot = _foot(raw)
         title = clean_title(raw.name)
-        part = import_part(_shift(raw, -foot), name, folder, f"{file_name}, {title}", others=others - foot)
+        part = import_solid(_shift(raw, -foot), name, folder, f"{file_name}, {title}", others=others - foot)
         places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
         called = f" ({title})" if raw.name != name else ""
         lines.append(f"{name}{called}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")

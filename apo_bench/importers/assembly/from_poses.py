@@ -27,7 +27,7 @@ def scenario_from_poses(
         poses: A file of `[[pose]]` entries.
         parts: Part files; empty: as the poses name them.
         source: What the poses come from, for the file.
-        up, fixed, order, clearance_mm, max_overlap_mm: As in `import_assembly`.
+        up, fixed, order, clearance_mm, max_overlap_mm: As in `import_parts`.
     """
     made = new_upright_scenario(read_posed(poses, list(parts)), up, tuple(fixed), clearance_mm, max_overlap_mm, order)
     write_scenario(made, out, f"Assembly of {out.stem}", source)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, PadPlace, Solid, holds, pose
+from apo_bench.geometry import Array, PadPlace, Solid, find_holds, pose
 from apo_bench.importers.assembly.ordering import Placing
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.planning.insertion.arrival import arrive
@@ -15,7 +15,7 @@ from apo_bench.planning.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.execution import RestingPart, Stroke, arrival_line, first_clear, obstacles
+from apo_bench.simulation.execution import RestingPart, Stroke, find_clear_grasp, list_obstacles, plan_arrival_line
 
 _ARM = "six_axis"
 _OVER_M = (0.0, 0.005, 0.0085)
@@ -64,22 +64,22 @@ def find_grasps(
         lift = Stroke(taken.T, -UP, _LIFT_M, taken.around)
         strokes = (lift, _stroke(solids, placing, now, goal))
         places = [*_places_from_above(solid, taken.T, arm.opening_m)]
-        clear = (first_clear(kinematics, solid, grasps, (taken, goal), strokes) for grasps in places)
+        clear = (find_clear_grasp(kinematics, solid, grasps, (taken, goal), strokes) for grasps in places)
         best[main] = next((grasp for grasp in clear if grasp is not None), None)
-        if best[main] is None and (offered := holds(solid, _up(goal.T), arm.opening_m)):
+        if best[main] is None and (offered := find_holds(solid, _up(goal.T), arm.opening_m)):
             best[main] = _grasp(offered[0])
             crowded.add(main)
     return FoundGrasps(best, frozenset(crowded))
 
 
 def _resting(solids: Mapping[str, Solid], part: str, at: Poses, moves: Sequence[str]) -> RestingPart:
-    return RestingPart(at[part], obstacles({name: solids[name] for name in at}, at, moves))
+    return RestingPart(at[part], list_obstacles({name: solids[name] for name in at}, at, moves))
 
 
 def _stroke(solids: Mapping[str, Solid], placing: Placing, now: Poses, goal: RestingPart) -> Stroke:
     """The way in."""
     assembly = Assembly({part: solids[part] for part in now}, (), frozenset())
-    line = arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
+    line = plan_arrival_line(arrive(assembly, placing.moves, placing.contacts, now), goal.T)
     return Stroke(goal.T, line.direction, line.travel, goal.around)
 
 
@@ -87,7 +87,7 @@ def _places_from_above(solid: Solid, T: Array, opening_m: float) -> Iterator[lis
     """Places of one height of the tips over the part after the other."""
     up = _up(T)
     for over in _OVER_M:
-        yield [_grasp(hold) for hold in _best_of_each_height(holds(solid, up, opening_m, over), up)]
+        yield [_grasp(hold) for hold in _best_of_each_height(find_holds(solid, up, opening_m, over), up)]
 
 
 def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:

@@ -8,14 +8,14 @@ import numpy as np
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
-from apo_bench.geometry import Array, Solid, extent, pose
+from apo_bench.geometry import Array, Solid, measure_extent, pose
 from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
 from apo_bench.importers.assembly.grasps import FoundGrasps, find_grasps
 from apo_bench.importers.assembly.ordering import OrderSearch, Placing
 from apo_bench.importers.assembly.posed import TABLE, PosedPart
 from apo_bench.importers.assembly.staging import Stance, choose_site, find_reach, find_stance, stage_parts
 from apo_bench.importers.assembly.touching import close_contacts, find_clashes, find_contacts, walls_without_play
-from apo_bench.importers.cad.solids import free_name
+from apo_bench.importers.cad.solids import find_free_name
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.scenario import Grasp, Site
 
@@ -52,7 +52,7 @@ class NewScenario:
     """The axis of the given poses that is up, and why."""
 
 
-class NoOrder(RuntimeError):
+class NoAssemblyOrder(RuntimeError):
     """Parts cannot be put together one after the other, with this side up."""
 
 
@@ -72,7 +72,7 @@ def new_scenario(
     Raises:
         InputError: No part has that name, there is no room on the table, or the wanted order is impossible.
         RuntimeError: Parts are inside each other.
-        NoOrder: There is no order in which they can be put together.
+        NoAssemblyOrder: There is no order in which they can be put together.
     """
     solids = {each.name: each.solid for each in parts}
     for name in fixed:
@@ -103,7 +103,9 @@ def new_scenario(
     search = OrderSearch(solids, poses, contacts, aside, wanted_order)
     order = search.find(frozenset(base))
     if order is None:
-        raise NoOrder("; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + ".")
+        raise NoAssemblyOrder(
+            "; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + "."
+        )
     mains = [placing.moves[0] for placing in order]
     require(
         not wanted_order or mains == list(wanted_order),
@@ -123,7 +125,7 @@ def new_scenario(
         starts[part][:3, 3] = (*at, stances[part].height_m)
         if not stances[part].stands:
             starts[part][2, 3] += FLOOR_M
-            fixtures[part] = make_fixture(free_name(f"fixture_{part}", solids), solids[part], turns[part])
+            fixtures[part] = make_fixture(find_free_name(f"fixture_{part}", solids), solids[part], turns[part])
             starts[fixtures[part].name] = pose.at((*at, 0.0))
             notes.append(f"'{part}' starts in a fixture made for it: it does not stand on the table")
         elif stances[part].rolls:
@@ -148,7 +150,7 @@ def new_scenario(
 
 def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
     """Return the parts that lie on the table, the largest first."""
-    low = {each.name: extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
+    low = {each.name: measure_extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
     lie = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
     return tuple(each.name for each in sorted(lie, key=lambda each: -each.solid.volume))
 
@@ -159,5 +161,5 @@ def _unfit(solids: Mapping[str, Solid], turns: Mapping[str, Array], found: Found
         if part in found.crowded:
             yield f"the gripper has no room to hold '{part}' from above; let it stand out higher, or give it a handle"
         if found.grasps[part] is None:
-            size = " x ".join(f"{1e3 * np.ptp(extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
+            size = " x ".join(f"{1e3 * np.ptp(measure_extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
             yield f"'{part}', {size} mm as it stands, offers no place to a gripper from above"

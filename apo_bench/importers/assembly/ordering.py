@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Operation, Poses
-from apo_bench.geometry import Array, Solid, drop, extent, pose
+from apo_bench.geometry import Array, Solid, measure_drop, measure_extent, pose
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.importers.assembly.touching import find_contacts
@@ -30,7 +30,7 @@ _MOST_SETS = 4000
 _LARGEST_GROUP = 4
 
 
-class Obstacle(NamedTuple):
+class RemovalObstacle(NamedTuple):
     """Why a part cannot leave."""
 
     passed: int
@@ -65,7 +65,7 @@ class OrderSearch:
     wanted: Sequence[str] = ()
     """Parts in the order in which they are put, where that is possible."""
     failed: set[frozenset[str]] = field(default_factory=set)
-    obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    obstacles: dict[str, RemovalObstacle] = field(default_factory=dict)
     """Part -> why it could not leave, where it passed most tests."""
     left: frozenset[str] = frozenset()
     """The fewest parts of which none could leave."""
@@ -116,7 +116,7 @@ class OrderSearch:
     def _lateness(self, placing: Placing) -> tuple[float, ...]:
         """The last part comes first: from above before from the side, the highest first."""
         part = placing.moves[0]
-        low, _ = extent(self.solids[part].pieces, self.poses[part][2, :3])
+        low, _ = measure_extent(self.solids[part].pieces, self.poses[part][2, :3])
         return (
             -self.wanted.index(part) if part in self.wanted else 0,
             "from above" not in placing.why,
@@ -124,7 +124,7 @@ class OrderSearch:
             self.solids[part].volume,
         )
 
-    def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | Obstacle:
+    def _leave(self, moves: Sequence[str], there: frozenset[str]) -> Placing | RemovalObstacle:
         """Return how parts come to their places last of all that are there, or why they cannot."""
         rest = [part for part in self.solids if part in there and part not in moves]
         main = moves[0]
@@ -137,16 +137,21 @@ class OrderSearch:
         # A part that is put back must rest: another is below it, and its weight is over the parts that carry it. The
         # macros of its contacts give a straight way, which must be free.
         if not contacts:
-            return Obstacle(0, f"'{main}' touches nothing that would be there before it")
-        if min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
-            return Obstacle(1, f"nothing is below '{main}' that would carry it")
+            return RemovalObstacle(0, f"'{main}' touches nothing that would be there before it")
+        if (
+            min(measure_drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
+            > _FALLS_M
+        ):
+            return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
         if imbalance(assembly, Operation(main, contacts, tuple(moves[1:])), poses) > BALANCED:
-            return Obstacle(2, f"'{main}' would not keep its balance on {others}, which would be there before it")
+            return RemovalObstacle(
+                2, f"'{main}' would not keep its balance on {others}, which would be there before it"
+            )
         arrival = arrive(assembly, moves, contacts, poses)
         if all(each.normal @ UP < _CARRIES for each in arrival.touched):
-            return Obstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
+            return RemovalObstacle(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it")
         if not arrival.free:
-            return Obstacle(3, f"'{main}' cannot leave {others}")
+            return RemovalObstacle(3, f"'{main}' cannot leave {others}")
         way = poses[main][:3, :3] @ arrival.line.direction
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         direction = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along

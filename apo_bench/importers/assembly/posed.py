@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, Solid, pose, world_bounds
-from apo_bench.importers.cad.solids import free_name
-from apo_bench.io import Table, read_typed
-from apo_bench.scenario.parts import load_part, part_path
+from apo_bench.geometry import Array, Solid, measure_world_bounds, pose
+from apo_bench.importers.cad.solids import find_free_name
+from apo_bench.io import FileTable, read_typed
+from apo_bench.scenario.parts import find_part_path, load_part
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
 TABLE = "table"
@@ -40,7 +40,7 @@ class PosedPart:
     """Its name in the CAD file, where that cannot be its name here."""
 
 
-class _Pose(Table, frozen=True):
+class _Pose(FileTable, frozen=True):
     """One table of a file of poses."""
 
     part: str
@@ -51,7 +51,7 @@ class _Pose(Table, frozen=True):
     color: tuple[_Share, _Share, _Share] | None = None
 
 
-class _PoseFile(Table, frozen=True):
+class _PoseFile(FileTable, frozen=True):
     """A file of poses."""
 
     pose: list[_Pose]
@@ -67,14 +67,14 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
         InputError: A file cannot be read, a part is missing, or has no pose.
     """
     stated = read_typed(poses, _PoseFile, "file of poses").pose
-    paths = {part_path(file).stem: part_path(file) for file in files}
+    paths = {find_part_path(file).stem: find_part_path(file) for file in files}
     solids: dict[Path, Solid] = {}
     parts: list[PosedPart] = []
     used = {*_TAKEN}
     for each in stated:
         file = paths.get(each.part, poses.parent / f"{each.part}.xml")
         solids[file] = solids[file] if file in solids else load_part(file)
-        name = free_name(each.name or each.part, used)
+        name = find_free_name(each.name or each.part, used)
         used.add(name)
         T = pose.unpack(np.array([*np.multiply(1e-3, each.at_mm), *each.quaternion_wxyz]))
         parts.append(PosedPart(name, file, solids[file], T, each.color, title=each.title))
@@ -92,6 +92,6 @@ def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, 
     """
     axis, sign = UPS[up]
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
-    low, high = world_bounds([(each.solid, turned @ each.T) for each in parts])
+    low, high = measure_world_bounds([(each.solid, turned @ each.T) for each in parts])
     shift = pose.at([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
     return tuple(replace(each, T=shift @ turned @ each.T) for each in parts)

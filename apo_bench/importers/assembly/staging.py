@@ -8,7 +8,7 @@ from shapely import MultiPoint, Point
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, Hull, Piece, Solid, extent
+from apo_bench.geometry import Array, Hull, Piece, Solid, measure_extent
 from apo_bench.scenario.scenario import Site
 
 _LOW_M = 2e-5
@@ -47,7 +47,7 @@ class Stance(NamedTuple):
 def find_stance(solid: Solid, R: Array) -> Stance:
     """Return how a solid with an orientation, (3, 3), stands."""
     up = R[2]
-    low = extent(solid.pieces, up)[0]
+    low = measure_extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
     middle = R @ solid.centroid
     if is_carried(base, middle, float(middle[2] - low)):
@@ -153,4 +153,4 @@ def _grid() -> Array:
 
 def _box(solid: Solid, R: Array) -> Array:
     """The box around a turned solid, seen from above: lowest and highest x and y of it, (2, 2), [m]."""
-    return np.array([extent(solid.pieces, R[0]), extent(solid.pieces, R[1])]).T
+    return np.array([measure_extent(solid.pieces, R[0]), measure_extent(solid.pieces, R[1])]).T

@@ -9,9 +9,18 @@ from itertools import combinations, product
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    FacingPair,
+    PartFace,
+    Poses,
+    classify_contact,
+    compute_geometric_play,
+    compute_play_mm,
+)
 from apo_bench.assembly.facing import facing
-from apo_bench.geometry import Array, Solid, intrusion, mate, pose
+from apo_bench.geometry import Array, Solid, measure_intrusion, measure_mate, pose
 from apo_bench.scenario.checks import DEEP_M
 
 NEAR_M = 5e-5
@@ -59,7 +68,7 @@ def find_clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float)
     """Return a sentence for each pair of parts that are inside each other, press fits and threads too."""
     sentences = list[str]()
     for a, b in combinations(solids, 2):
-        deep_m = intrusion(solids[a], poses[a], solids[b], poses[b])
+        deep_m = measure_intrusion(solids[a], poses[a], solids[b], poses[b])
         tight = _tight_fit(solids, poses, (a, b), clearance_mm, deep_m)
         if tight:
             sentences.append(tight)
@@ -98,10 +107,10 @@ def _tight_fit(
     """
     a, b = pair
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
-        play = play_mm(wall, other, clearance_mm) if contact_kind(wall, other) == "shaft in hole" else None
-        if play is None or play > NO_PLAY_MM or geometric_play(wall, other) < -min(_THREAD_M, deep_m + NEAR_M):
+        play = compute_play_mm(wall, other, clearance_mm) if classify_contact(wall, other) == "shaft in hole" else None
+        if play is None or play > NO_PLAY_MM or compute_geometric_play(wall, other) < -min(_THREAD_M, deep_m + NEAR_M):
             continue
-        fit = mate(wall, poses[a], other, poses[b])
+        fit = measure_mate(wall, poses[a], other, poses[b])
         if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
             return (
                 f"'{a}.{wall.name}' and '{b}.{other.name}' have radii of {1e3 * wall.radius:.4g} and "
@@ -144,7 +153,7 @@ def _solve(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], f
     return now
 
 
-def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Facing | None:
+def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> FacingPair | None:
     """How the two faces of a contact face each other; None if they do not."""
     a, b = contact
     pairs = facing(
@@ -164,5 +173,5 @@ def _openness(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> fl
     each = _facing(solids, poses, contact)
     if each is None:
         return np.inf
-    is_on_rim = contact_kind(*map(Assembly(solids, (), frozenset()).face_of, contact)) == "cone on rim"
+    is_on_rim = classify_contact(*map(Assembly(solids, (), frozenset()).face_of, contact)) == "cone on rim"
     return max(abs(each.gap_m) / _CLOSED_M, 0.0 if is_on_rim else each.angle_rad / _CLOSED_RAD)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from apo_bench.errors import InputError
 from apo_bench.importers.assembly.added_clearance import MOST_OVERLAP_MM, add_clearance
-from apo_bench.importers.assembly.new_scenario import NewScenario, NoOrder, lowest, new_scenario
+from apo_bench.importers.assembly.new_scenario import NewScenario, NoAssemblyOrder, lowest, new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
 
 _UP_AXES = ("z", "-z", "x", "-x", "y", "-y")
@@ -35,11 +35,11 @@ def new_upright_scenario(
     """
     parts, notes = add_clearance(parts, clearance_mm, most_overlap_mm)
     found: dict[str, NewScenario] = {}
-    failed: dict[str, NoOrder | InputError] = {}
+    failed: dict[str, NoAssemblyOrder | InputError] = {}
     for axis in (up,) if up else _UP_AXES:
         try:
             scenario = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, wanted_order)
-        except (NoOrder, InputError) as error:
+        except (NoAssemblyOrder, InputError) as error:
             failed[axis] = error
             continue
         found[axis] = replace(scenario, notes=(*notes, *scenario.notes))
@@ -60,9 +60,9 @@ def _on_a_base(
     """The scenario on the fixed parts, or on the largest of the lowest parts with which there is an order."""
     try:
         return new_scenario(parts, fixed, clearance_mm, wanted_order)
-    except NoOrder:
+    except NoAssemblyOrder:
         for base in () if fixed else lowest(parts)[1:_MOST_BASES]:
-            with suppress(NoOrder):
+            with suppress(NoAssemblyOrder):
                 scenario = new_scenario(parts, (base,), clearance_mm, wanted_order)
                 return replace(scenario, why_fixed="one of the lowest; with larger ones there is no order")
         raise

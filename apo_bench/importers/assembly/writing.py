@@ -14,7 +14,7 @@ from apo_bench.importers.assembly.ordering import Placing
 from apo_bench.importers.assembly.posed import TABLE, PosedPart
 from apo_bench.io import clean, write_file
 from apo_bench.records import Thresholds
-from apo_bench.scenario.parts import part_names, part_path
+from apo_bench.scenario.parts import find_part_path, list_part_names
 
 _WIDTH = 118
 THRESHOLDS = {
@@ -96,7 +96,7 @@ def choice_lines(new: NewScenario) -> Iterator[str]:
 
 def _part_lines(new: NewScenario, each: PosedPart, folder: Path) -> Iterator[str]:
     yield f"[parts.{each.name}]" + (f"  # {clean(each.title)}" if each.title else "")
-    is_packaged = each.file.stem in part_names() and part_path(each.file.stem) == each.file
+    is_packaged = each.file.stem in list_part_names() and find_part_path(each.file.stem) == each.file
     file = each.file.stem if is_packaged else Path(os.path.relpath(each.file, folder)).as_posix()
     yield f"file = {_quote(file)}"
     if each.color is not None:

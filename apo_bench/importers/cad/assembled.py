@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.cad.solids import Mesh, RawSolid, body_of
+from apo_bench.importers.cad.solids import Mesh, RawSolid, convert_to_manifold
 
 _STEP_MM = 1.0
 """The distance of points, and of the positions on a way."""
@@ -21,7 +21,7 @@ def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
 
     Others also move along the axes of the assembly, as far as such a way is free.
     """
-    bodies = [body_of(raw.mesh) for raw in raws]
+    bodies = [convert_to_manifold(raw.mesh) for raw in raws]
     points = [surface_points(raw.mesh, _STEP_MM) for raw in raws]
     return [
         # A point that comes by again and again counts once.
@@ -52,7 +52,7 @@ def surface_points(mesh: Mesh, step: float) -> Array:
         step: The largest distance of neighbours, [mm]; large parts have a larger one.
     """
     area = float(np.linalg.norm(mesh.across, axis=1).sum()) / 2.0
-    fine = body_of(mesh).refine_to_length(max(step, (2.0 * area / _MOST_POINTS) ** 0.5)).to_mesh64()
+    fine = convert_to_manifold(mesh).refine_to_length(max(step, (2.0 * area / _MOST_POINTS) ** 0.5)).to_mesh64()
     return np.unique(np.asarray(fine.vert_properties)[:, :3].astype(np.float64), axis=0)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import shapely
 
-from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straighten
+from apo_bench.geometry import Array, Face, RoundFace, count_sides, list_rings, straighten
 from apo_bench.importers.cad.faces.fitting import ON_WALL
-from apo_bench.importers.cad.solids import RawSolid, Region, square_to
+from apo_bench.importers.cad.solids import RawSolid, Region, find_square_axes
 from apo_bench.scenario.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05
@@ -38,13 +38,13 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
     None if it has no single outline.
     """
     n = region.direction
-    flat = np.array(square_to(n))
+    flat = np.array(find_square_axes(n))
     triangles = raw.mesh.corners[raw.mesh.triangles[region.triangles]] @ flat.T
     area = shapely.coverage_union_all(shapely.polygons(triangles))
     if area.geom_type != "Polygon":
         return None
     offset = float(n @ region.point) * n
-    rings = [ring @ flat + offset for ring in rings_of(area, 1.0)]
+    rings = [ring @ flat + offset for ring in list_rings(area, 1.0)]
     drawn = [_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
     outline, *holes = (straighten(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
     return Face(region.name, outline, tuple(holes))
@@ -60,7 +60,7 @@ def _circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
     along = float(wall.direction @ region.direction)
     height = float((region.point - wall.point) @ region.direction / along)
     r = float(wall.radius_at(height))
-    n = max(sides_of(1e-3 * max(wall.radii)), COARSE_SIDES)
+    n = max(count_sides(1e-3 * max(wall.radii)), COARSE_SIDES)
     # An outline is counter-clockwise seen against the normal of its face, a hole clockwise.
     turn = -1.0 if hole == (along > 0.0) else 1.0
     return wall.around(height, r / np.cos(np.pi / n) if hole else r, turn * 2.0 * np.pi * (np.arange(n) + 0.5) / n)

@@ -10,7 +10,7 @@ import numpy as np
 from shapely import Polygon
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Array, Face, RoundFace, Solid, passage
+from apo_bench.geometry import Array, Face, RoundFace, Solid, measure_passage
 from apo_bench.importers.cad.contact_faces import contact_faces
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES
 from apo_bench.importers.cad.faces.regions import find_regions
@@ -23,7 +23,7 @@ from apo_bench.importers.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.agreement import check_faces, supported
 from apo_bench.scenario.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
-from apo_bench.scenario.parts.making import Body, solid_of, write_part
+from apo_bench.scenario.parts.making import Body, build_solid, write_part
 from apo_bench.scenario.parts.making.moments import Moments
 
 _RAYS = 720
@@ -69,7 +69,7 @@ def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -
     return file, [replace(raw, regions=name_regions(raw.mesh, find_regions(raw.mesh, fewest_sides))) for raw in solids]
 
 
-def import_part(
+def import_solid(
     raw: RawSolid,
     name: str,
     folder: Path,
@@ -163,7 +163,7 @@ def _keep_held_faces(body: Body, least: float, refused: dict[str, str]) -> tuple
         least: The share of a flat face that must be held.
         refused: Gets the other faces, with the reason.
     """
-    solid = solid_of("part", body)
+    solid = build_solid("part", body)
     flats = {face.name: face for face in body.flats}
     shares: dict[str, float] = {}
     faces: list[Face | RoundFace] = [*body.flats, *body.rounds]
@@ -202,6 +202,6 @@ def _free_radius(solid: Solid, wall: RoundFace) -> float:
     at = wall.point + (wall.span[0] + share * wall.length) * wall.axis
     nearest = np.inf
     for piece in solid.pieces:
-        enter, leave = passage(piece.planes, at, out)
+        enter, leave = measure_passage(piece.planes, at, out)
         nearest = min(nearest, np.maximum(enter, 0.0)[leave > 0.0].min(initial=np.inf))
     return float(nearest)

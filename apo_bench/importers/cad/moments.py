@@ -8,7 +8,7 @@ import trimesh
 
 from apo_bench.geometry import Hull
 from apo_bench.importers.cad.pieces.cutting import Cut
-from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, mesh_of
+from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, convert_to_mesh
 from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
 
 
@@ -29,7 +29,7 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
 def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
     """[m]: of what the pieces fill."""
     hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
-    return _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
+    return _mesh_moments(convert_to_mesh(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
 
 
 def _mesh_moments(mesh: Mesh) -> Moments:
@@ -43,6 +43,6 @@ def _mesh_moments(mesh: Mesh) -> Moments:
 def _behind_sides(mesh: Mesh, wall: Region) -> Moments:
     """Between a round wall and its sides, [mm]."""
     corners = mesh.corners[np.unique(mesh.triangles[wall.triangles])]
-    within = _mesh_moments(mesh_of(manifold3d.Manifold.hull_points(corners)))
+    within = _mesh_moments(convert_to_mesh(manifold3d.Manifold.hull_points(corners)))
     true = frustum_moments(*wall.span, *wall.radii).moved(np.column_stack([*wall.across, wall.direction]), wall.point)
     return true.plus(within, -1.0)

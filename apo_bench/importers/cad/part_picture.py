@@ -8,14 +8,14 @@ import numpy as np
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.solids import RawSolid
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
 _FLAT, _ROUND, _REFUSED, _NAMELESS = "#8fb3d9", "#e0b070", "#d98f8f", "#cfcfcf"
 
 
-@default_looks()
+@use_figure_style()
 def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) -> None:
     """Write it as PNG: flat faces blue, round ones orange, red what can make no contact though it has a name."""
     from matplotlib.figure import Figure

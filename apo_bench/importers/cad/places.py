@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.importers.cad.solids import SolidPlace, clean_title, part_name
+from apo_bench.importers.cad.solids import SolidPlace, clean_title, make_part_name
 from apo_bench.io import write_file
 
 
@@ -21,7 +21,7 @@ def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, s
     copies = []
     for part, places in parts.items():
         for place in places:
-            name = part_name(place.name, used)
+            name = make_part_name(place.name, used)
             used.add(name)
             copies.append((part, name, place))
     return copies

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, extent, pose
+from apo_bench.geometry import Array, measure_extent, pose
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, find_camera
 from apo_bench.importers.recording.contact_fit import ContactFit, contact_fit
 from apo_bench.importers.recording.ordering import Order, Stated, end_of_operation, find_order, stated_order
-from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, poses_at
+from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _HIGH_M = 0.01
 _TILTED_DEG = 10.0
@@ -55,7 +55,7 @@ def arrange(
         planned: Where the scenario starts every part, world, [m].
 
     Raises:
-        NoOrder: The moves are not the operations.
+        NoMatchingOrder: The moves are not the operations.
         InputError: The camera file states no pose of the camera.
     """
     solved = find_camera(intervals, camera, planned, assembly.fixed)
@@ -73,7 +73,7 @@ def arrange(
     for k, interval in enumerate(order.intervals):
         if interval is not None:
             t = end_of_operation(assembly, intervals, order.intervals, k)
-            reached = {part: X @ T for part, T in poses_at(intervals, t).items()}
+            reached = {part: X @ T for part, T in find_rest_poses(intervals, t).items()}
             fits[k] = contact_fit(assembly, k, {**start, **reached})
     return Arrangement(solved, order, start, {**source, **in_hand}, fits, intervals)
 
@@ -92,11 +92,11 @@ def _since_standing(
     """
     part = known[0].part
     pieces = assembly.solids[part].pieces
-    lowest = planned[2, 3] + extent(pieces, planned[2, :3])[0]
+    lowest = planned[2, 3] + measure_extent(pieces, planned[2, :3])[0]
     moves = sum(operation.main == part for operation in assembly.operations)
     for i in range(max(1, len(known) - moves)):
         T = X @ known[i].rests[0].T
-        if part in assembly.fixed or T[2, 3] + extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
+        if part in assembly.fixed or T[2, 3] + measure_extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
             return tuple(known[i:])
     return ()
 

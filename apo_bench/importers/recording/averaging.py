@@ -6,9 +6,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 
-_FRAME_FLOOR = frozen(np.repeat([2e-5, 2e-4], 3), 6)
+_FRAME_FLOOR = copy_frozen(np.repeat([2e-5, 2e-4], 3), 6)
 """The smallest deviation of one frame, [m, rad]: files have rounded numbers."""
 _FAR = 5.0
 """A frame that is farther off, in standard deviations of any axis, is an outlier: 1 in 300,000 by chance."""

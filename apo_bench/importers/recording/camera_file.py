@@ -11,7 +11,7 @@ from msgspec import Meta, field
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.io import Table, convert_typed, read_typed
+from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
 
 _EULER = re.compile(r"(?!.*(.)\1)([xyz]{3}|[XYZ]{3})")
@@ -19,7 +19,7 @@ NamedEntries = Annotated[dict[str, Any], Meta(min_length=1)]
 """A table whose keys are names of the reader's own."""
 
 
-class Conventions(Table, frozen=True, kw_only=True):
+class Conventions(FileTable, frozen=True, kw_only=True):
     """How a log is written, where its columns do not show it."""
 
     length: Literal["mm", "cm", "m"] | None = None
@@ -41,7 +41,7 @@ class Conventions(Table, frozen=True, kw_only=True):
     """What it is here -> column of the file."""
 
 
-class NoiseTable(Table, frozen=True, kw_only=True):
+class RestNoiseTable(FileTable, frozen=True, kw_only=True):
     """An error that stays while a part rests."""
 
     stays_mm: Annotated[float, Meta(ge=0.0, le=100.0)]
@@ -53,14 +53,14 @@ class NoiseTable(Table, frozen=True, kw_only=True):
         return np.array([self.stays_mm * 1e-3, np.radians(self.stays_deg)])
 
 
-class CameraTable(Table, frozen=True, kw_only=True):
+class CameraTable(FileTable, frozen=True, kw_only=True):
     """The tables of the file."""
 
     schema: Literal["apo-bench/camera/1"]
     log: Conventions = Conventions()
     pose: AnyPose | None = None
     known: NamedEntries | None = None
-    noise: NoiseTable | None = None
+    noise: RestNoiseTable | None = None
 
 
 @final

@@ -9,13 +9,13 @@ import numpy as np
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import require, require_known
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.importers.recording.averaging import Mean
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.rest_intervals import RestIntervals
 
 _ROUNDS = 50
-_PLACE_DEVIATION = frozen(np.repeat([2e-4, 2e-3], 3), 6)
+_PLACE_DEVIATION = copy_frozen(np.repeat([2e-4, 2e-3], 3), 6)
 """Standard deviation of a known place, per axis, [m, rad]."""
 
 

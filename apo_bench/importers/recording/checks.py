@@ -12,8 +12,8 @@ from apo_bench.importers.recording.arrangement import Arrange, Arrangement
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.log_poses import mirror
-from apo_bench.importers.recording.observed_operation import ObservedOperation
-from apo_bench.importers.recording.ordering import NoOrder, describe_moves
+from apo_bench.importers.recording.observed_operation import LoggedOperation
+from apo_bench.importers.recording.ordering import NoMatchingOrder, describe_moves
 from apo_bench.importers.recording.rest_intervals import RestIntervals, is_near
 
 _FITS_MM = 20.0
@@ -39,7 +39,7 @@ def check_arrangement(
     for key, change in _other_conventions():
         try:
             wrong = arrange(_change_models(intervals, models, change)).wrong_mm
-        except (NoOrder, np.linalg.LinAlgError):
+        except (NoMatchingOrder, np.linalg.LinAlgError):
             continue
         if wrong < best:
             best = wrong
@@ -84,7 +84,7 @@ def _change_models(
 
 def check_moved(
     intervals: RestIntervals,
-    operations: Sequence[ObservedOperation],
+    operations: Sequence[LoggedOperation],
     camera: CameraFile,
     assembly: Assembly,
     file: str,

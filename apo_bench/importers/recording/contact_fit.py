@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
-from apo_bench.geometry import RoundFace, beside, face_area
+from apo_bench.assembly import Assembly, Contact, Poses, measure_height, measure_round
+from apo_bench.geometry import RoundFace, measure_face_area, measure_lateral_gap
 
 
 class ContactFit(NamedTuple):
@@ -34,8 +34,8 @@ def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
         measured = measure_round(a, T_a, b, T_b)
         return ContactFit(abs(measured.gap_m), measured.angle_rad)
     # From the middle of the smaller face: how high above the plane of the larger one, how far beside its outline.
-    if face_area(a) > face_area(b):
+    if measure_face_area(a) > measure_face_area(b):
         (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
     cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))
-    apart = float(np.hypot(height(a, T_a, b, T_b), beside(a, T_a, b, T_b)))
+    apart = float(np.hypot(measure_height(a, T_a, b, T_b), measure_lateral_gap(a, T_a, b, T_b)))
     return ContactFit(apart, float(np.arccos(np.clip(-cosine, -1.0, 1.0))))

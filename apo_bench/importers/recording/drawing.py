@@ -9,12 +9,12 @@ import numpy as np
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.rest_intervals import find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.io import default_looks, save_figure
+from apo_bench.io import save_figure, use_figure_style
 
 _AXIS_COLORS = ("#c0392b", "#2e8b57", "#2456a6")
 
 
-@default_looks()
+@use_figure_style()
 def draw_recording(
     title: str,
     tracks: Mapping[str, PoseTrack],

@@ -15,12 +15,12 @@ from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import rest_error
 from apo_bench.importers.recording.checks import check_arrangement, check_moved
 from apo_bench.importers.recording.doubts import list_doubts
-from apo_bench.importers.recording.observed_operation import ObservedOperation, observed_operation
-from apo_bench.importers.recording.ordering import NoOrder, Stated
+from apo_bench.importers.recording.observed_operation import LoggedOperation, observed_operation
+from apo_bench.importers.recording.ordering import NoMatchingOrder, Stated
 from apo_bench.importers.recording.rest_intervals import find_all_intervals
 from apo_bench.importers.recording.tracks import PoseTrack
-from apo_bench.perception.observation.models import UNSEEN_DEVIATION, floor_covariance, last_seen, with_shared
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.perception.observation.models import UNSEEN_DEVIATION, add_shared_error, find_last_seen, floor_covariance
+from apo_bench.scenario import Scenario, place_layout
 
 
 @final
@@ -31,7 +31,7 @@ class ImportedRecording:
     scenario: Scenario
     observation: Observation
     arrangement: Arrangement
-    operations: tuple[ObservedOperation, ...]
+    operations: tuple[LoggedOperation, ...]
     unclear: tuple[str, ...]
     """What stays unclear, one sentence each."""
 
@@ -68,7 +68,7 @@ def import_recording(
     arrange_log = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     try:
         arrangement = arrange_log(intervals)
-    except NoOrder as error:
+    except NoMatchingOrder as error:
         raise InputError(f"{file}: {error}") from error
     check_arrangement(arrangement, arrange_log, intervals, models or {}, file)
     intervals = arrangement.intervals
@@ -87,7 +87,7 @@ def import_recording(
     observation = Observation(
         assembly=assembly,
         start=arrangement.start,
-        poses=last_seen(assembly, arrangement.start, poses, observed),
+        poses=find_last_seen(assembly, arrangement.start, poses, observed),
         covariance=floor_covariance(covariance + _adjustments(operations, assembly)),
         observed=observed,
         gap_m=scenario.gap_mm * 1e-3,
@@ -96,17 +96,17 @@ def import_recording(
     if arrangement.camera.covariance is not None and observed.any():
         # One camera observed all poses: they share the error of its pose.
         sharing = tuple(np.flatnonzero(observed).tolist())
-        observation = with_shared(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
+        observation = add_shared_error(observation, SharedError("camera", sharing, arrangement.camera.covariance, X))
     unclear = list_doubts(intervals, arrangement, covariance, assembly)
     return ImportedRecording(scenario, observation, arrangement, operations, unclear)
 
 
 def planned_starts(scenario: Scenario) -> Poses:
     """Return where the scenario starts every part, world, [m]."""
-    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
+    return place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
-def _adjustments(operations: Sequence[ObservedOperation], assembly: Assembly) -> Array:
+def _adjustments(operations: Sequence[LoggedOperation], assembly: Assembly) -> Array:
     """The square of what later operations moved without need, at the operation that had placed it, (n, 6, 6)."""
     C = np.zeros((len(assembly), 6, 6))
     for k, operation in enumerate(operations):

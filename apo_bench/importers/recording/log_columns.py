@@ -46,7 +46,7 @@ _SYNONYMS = {
 }
 
 
-class Column(NamedTuple):
+class LogColumn(NamedTuple):
     """The meaning of a column, and the unit in its name, which may be empty."""
 
     meaning: str
@@ -54,16 +54,16 @@ class Column(NamedTuple):
 
 
 _ROS_FIELDS = {
-    **{f"{kind}.{axis}": Column(axis, "m") for kind in ("position", "translation") for axis in "xyz"},
-    **{f"{kind}.{axis}": Column(f"q{axis}") for kind in ("orientation", "rotation") for axis in "wxyz"},
-    **dict.fromkeys(("stamp.sec", "stamp.secs"), Column("seconds")),
-    **dict.fromkeys(("stamp.nanosec", "stamp.nsecs"), Column("nanoseconds")),
-    "header.stamp": Column("stamp"),
+    **{f"{kind}.{axis}": LogColumn(axis, "m") for kind in ("position", "translation") for axis in "xyz"},
+    **{f"{kind}.{axis}": LogColumn(f"q{axis}") for kind in ("orientation", "rotation") for axis in "wxyz"},
+    **dict.fromkeys(("stamp.sec", "stamp.secs"), LogColumn("seconds")),
+    **dict.fromkeys(("stamp.nanosec", "stamp.nsecs"), LogColumn("nanoseconds")),
+    "header.stamp": LogColumn("stamp"),
 }
 """The last two names of a field of a ROS message, as `field.pose.position.x` or `/vision/pose/position/x` have it."""
 
 
-def find_column(name: str) -> Column | None:
+def find_column(name: str) -> LogColumn | None:
     """Return what a column of this name means; None for a column that is ignored."""
     *path, name = re.split(r"[./]", name.strip().lower())
     if path and name != "child_frame_id":
@@ -73,4 +73,4 @@ def find_column(name: str) -> Column | None:
         stem = name
         unit = ""
     meaning = _SYNONYMS.get(stem, stem)
-    return Column(meaning, unit) if meaning in _MEANINGS else None
+    return LogColumn(meaning, unit) if meaning in _MEANINGS else None

@@ -11,7 +11,7 @@ from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording import log_columns
 from apo_bench.importers.recording.camera_file import Conventions
-from apo_bench.importers.recording.log_columns import Column, find_column
+from apo_bench.importers.recording.log_columns import LogColumn, find_column
 from apo_bench.importers.recording.log_tables import LogTable
 from apo_bench.importers.recording.tracks import LogRows
 
@@ -80,7 +80,7 @@ def _read_columns(table: LogTable, how: Conventions) -> tuple[list[str], dict[st
     return ids, cells
 
 
-def _factor(table: LogTable, column: Column, how: Conventions) -> float:
+def _factor(table: LogTable, column: LogColumn, how: Conventions) -> float:
     quantity = log_columns.QUANTITIES.get(column.meaning)
     if quantity is None:
         return 1.0

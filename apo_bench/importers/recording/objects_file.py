@@ -9,21 +9,21 @@ from apo_bench.errors import one_line, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.camera_file import NamedEntries
 from apo_bench.importers.recording.tracks import Log, PoseTrack
-from apo_bench.io import Table, convert_typed, read_typed
+from apo_bench.io import FileTable, convert_typed, read_typed
 from apo_bench.scenario.values import AnyPose
 
 _MOST_IDS = 12
 """An error names no more ids than this."""
 
 
-class ObjectTable(Table, frozen=True, kw_only=True):
+class ObjectTable(FileTable, frozen=True, kw_only=True):
     """One part; ids are texts, or whole numbers as in BOP files."""
 
     id: str | int
     frame: AnyPose = AnyPose(at_mm=(0.0, 0.0, 0.0))
 
 
-class ObjectsTable(Table, frozen=True, kw_only=True):
+class ObjectsTable(FileTable, frozen=True, kw_only=True):
     """The tables of the file."""
 
     schema: Literal["apo-bench/objects/1"]

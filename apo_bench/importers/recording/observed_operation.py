@@ -6,12 +6,12 @@ from typing import NamedTuple
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.ordering import end_of_operation, time_taken
-from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, poses_at
+from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 from apo_bench.importers.recording.rests import Rest
 from apo_bench.importers.recording.tracks import PoseTrack
 
 
-class ObservedOperation(NamedTuple):
+class LoggedOperation(NamedTuple):
     """One operation as the log shows it."""
 
     interval: RestInterval | None = None
@@ -33,7 +33,7 @@ def observed_operation(
     assembly: Assembly,
     T_world_camera: Array,
     k: int,
-) -> ObservedOperation:
+) -> LoggedOperation:
     """Return operation k, counted from 0.
 
     Args:
@@ -43,7 +43,7 @@ def observed_operation(
     operation = assembly.operations[k]
     interval = chosen[k]
     if interval is None:
-        return ObservedOperation()
+        return LoggedOperation()
     over = end_of_operation(assembly, intervals, chosen, k)
     rest = interval.at(over)
     begins = time_taken(assembly, intervals, chosen[:k], interval)
@@ -51,8 +51,10 @@ def observed_operation(
     among = (track.t >= begins) & (track.t <= rest.begins)
     path = PoseTrack(track.t[among], T_world_camera @ track.T[among])
     # An operation before it had put its part, also if this one began before that part rested.
-    before = poses_at(intervals, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)]))
-    after = poses_at(intervals, over)
+    before = find_rest_poses(
+        intervals, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)])
+    )
+    after = find_rest_poses(intervals, over)
     # The motion of the main part, a displacement in the frame of the camera, moves what stands fast in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])
     carried = {
@@ -62,4 +64,4 @@ def observed_operation(
     }
     others = {part: pose.log(pose.inverse(T) @ after[part]) for part, T in before.items() if part != operation.main}
     adjusted = {part: twist for part, twist in others.items() if part not in carried and twist.any()}
-    return ObservedOperation(interval, rest, path, carried, adjusted)
+    return LoggedOperation(interval, rest, path, carried, adjusted)

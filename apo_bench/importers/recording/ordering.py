@@ -14,7 +14,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.importers.recording.contact_fit import contact_fit
-from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, poses_at
+from apo_bench.importers.recording.rest_intervals import RestInterval, RestIntervals, find_rest_poses
 
 _LONG_S = 1.0
 _WIDE_MM = 50.0
@@ -40,7 +40,7 @@ Chosen = tuple[RestInterval | None, ...]
 """The interval with which each of the first operations ends; None of one that was not observed."""
 
 
-class NoOrder(InputError):
+class NoMatchingOrder(InputError):
     """The moves of a log are not those of the scenario."""
 
 
@@ -72,14 +72,14 @@ def find_order(
         unseen: Operations, counted from 0, that the log does not show.
 
     Raises:
-        NoOrder: No choice has the order of the operations.
+        NoMatchingOrder: No choice has the order of the operations.
     """
     last = {operation.main: k for k, operation in enumerate(assembly.operations) if k not in unseen}
 
     @cache
     def worth(k: int, interval: RestInterval) -> float:
         known = intervals[interval.part]
-        poses = {part: T_world_camera @ T for part, T in poses_at(intervals, interval.ends).items()}
+        poses = {part: T_world_camera @ T for part, T in find_rest_poses(intervals, interval.ends).items()}
         wrong_mm = contact_fit(assembly, k, {**start, **poses}).wrong_mm
         is_carried_later = any(interval.part in other.carries for other in assembly.operations[k + 1 :])
         is_last = last[interval.part] == k and not is_carried_later
@@ -141,7 +141,7 @@ def _best_choices(
                     by_end.setdefault(interval, []).append(longer)
         if not by_end:
             rests = ", ".join(f"{interval.begins:.2f} s" for interval in intervals[operation.main])
-            raise NoOrder(
+            raise NoMatchingOrder(
                 f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
                 f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on; none of these "
                 "follows the others; check the ids in the objects file and that the log begins before the first part "

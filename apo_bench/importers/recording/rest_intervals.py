@@ -66,7 +66,7 @@ def find_intervals(part: str, rests: Sequence[Rest]) -> tuple[RestInterval, ...]
     return tuple(RestInterval(part, tuple(group)) for group in groups)
 
 
-def poses_at(intervals: RestIntervals, t: float) -> Mapping[str, Array]:
+def find_rest_poses(intervals: RestIntervals, t: float) -> Mapping[str, Array]:
     """Return where every part rests at a time, [s], or rested last: (4, 4), camera from part, [m]."""
     return {
         part: next((each for each in reversed(known) if each.begins <= t), known[0]).at(t).T

@@ -11,7 +11,7 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.importers.recording.averaging import Mean, average, common_scatter, pool_mean
 from apo_bench.importers.recording.tracks import PoseTrack
 
@@ -21,7 +21,7 @@ _FEWEST = 4
 """Frames of a rest."""
 _ENOUGH_HZ = 30.0
 """Frames a second in which rests are searched."""
-_LEAST = frozen(np.repeat([2e-4, 1.7e-3], 3), 6)
+_LEAST = copy_frozen(np.repeat([2e-4, 1.7e-3], 3), 6)
 """Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
 _STILL = 5.3
 """sqrt of the 99.99 % quantile of chi-square with 6 degrees of freedom."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.importers.recording.averaging import per_axis
 from apo_bench.importers.recording.camera_file import CameraFile
 from apo_bench.importers.recording.camera_pose import CameraPose, rest_error
@@ -13,13 +13,13 @@ from apo_bench.importers.recording.importing import ImportedRecording
 from apo_bench.importers.recording.objects_file import ObjectsFile
 from apo_bench.importers.recording.rests import Rest
 from apo_bench.importers.recording.tracks import Log
-from apo_bench.io import columns
+from apo_bench.io import align_columns
 
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "deviation of a frame")
 POSE_HEAD = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 OBSERVATION_HEAD = ("operation", "part", *POSE_HEAD, "deviation_mm", "deviation_deg", "seen")
 PATH_HEAD = ("operation", "part", "t_s", *POSE_HEAD)
-_POSE_UNITS = frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
+_POSE_UNITS = copy_frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """mm for m of a packed pose."""
 
 
@@ -76,7 +76,7 @@ def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array) -> list[str]:
         m, rad = per_axis(rest.mean.scatter)
         frames = (str(len(rest.mean.inlier)), str(int((~rest.mean.inlier).sum())))
         table.append((str(k), part, begins, ends, *frames, *place, f"{1e3 * m:.2f} mm {np.degrees(rad):.2f} deg"))
-    return columns(table)
+    return align_columns(table)
 
 
 def observation_rows(

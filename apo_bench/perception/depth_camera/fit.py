@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.perception.depth_camera.surface import Surface, load_small_gicp
 
 _LEAST_NOISE_M = 0.0001
@@ -15,7 +15,7 @@ _LEAST_NOISE_M = 0.0001
 BENT_M = 0.003
 """Noise of this size doubles the covariance: beside an edge the nearest surface is then often not the one that was
 hit, which the linear part of the formula does not know. `benchmarks/depth_camera.py` measures it."""
-PRIOR = frozen([0.05] * 3 + [0.5] * 3, 6)
+PRIOR = copy_frozen([0.05] * 3 + [0.5] * 3, 6)
 """Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say
 nothing, and states for them how little that is."""
 _WIDTHS = 2.0
@@ -57,7 +57,7 @@ class Fits(NamedTuple):
     """(s,), mean of the squared distances over the largest that counts, 0 to 1."""
 
 
-def refine(surface: Surface, points: Points, starts: Iterable[Array], width_m: float, turns: int) -> Fits:
+def refine_fit(surface: Surface, points: Points, starts: Iterable[Array], width_m: float, turns: int) -> Fits:
     """Go down from every start (s, 4, 4): the least distances of the points from the planes of the surface."""
     gicp = load_small_gicp()
     source = gicp.PointCloud(points.at)

@@ -8,11 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turn_alike
+from apo_bench.geometry import (
+    Array,
+    find_least_turned,
+    find_nearest_symmetric_pose,
+    find_symmetries,
+    pose,
+    shrink_pieces,
+)
 from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.perception.depth_camera.rays import RayCaster
-from apo_bench.perception.depth_camera.regions import Regions, find_regions
+from apo_bench.perception.depth_camera.regions import Regions, find_changed_regions
 from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
 
 _GONE = 0.5
@@ -70,7 +77,7 @@ def follow_demonstration(
     assembly = expected.assembly
     believed = {part: expected.start[part] for part in assembly.solids}
     surfaces = {
-        part: sample_surface(physical_pieces(solid, expected.play_m))
+        part: sample_surface(shrink_pieces(solid, expected.play_m))
         for part, solid in assembly.solids.items()
         if part not in assembly.fixed
     }
@@ -93,7 +100,7 @@ def follow_demonstration(
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = turn_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
+            T = find_least_turned(solid, find_nearest_symmetric_pose(located.T, find_symmetries(solid), turn), turn)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
             located = LocatedModel(T, _turn_covariance(located, T), located.explained)
@@ -120,7 +127,7 @@ def _spell(
     """
     spell = None
     for last in range(first + 1, len(images)):
-        compared = tuple(find_regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
+        compared = tuple(find_changed_regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
         moved = _find_gone(owners, tuple(assembly.solids), compared) - assembly.fixed
         if not moved:
             continue
@@ -180,7 +187,7 @@ def _find_model(
 
 
 def _model_alone(assembly: Assembly, surfaces: Mapping[str, Surface], part: str) -> Model:
-    return Model({part: np.eye(4)}, surfaces[part], symmetries(assembly.solids[part]))
+    return Model({part: np.eye(4)}, surfaces[part], find_symmetries(assembly.solids[part]))
 
 
 def _moving_model(assembly: Assembly, surfaces: Mapping[str, Surface], believed: Poses, which: int) -> Model:

@@ -7,9 +7,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, frozen
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.perception.depth_camera.explained import measure_share
-from apo_bench.perception.depth_camera.fit import Fits, Points, covariance, refine
+from apo_bench.perception.depth_camera.fit import Fits, Points, covariance, refine_fit
 from apo_bench.perception.depth_camera.range_finder import PinholeView
 from apo_bench.perception.depth_camera.rays import RayCaster
 from apo_bench.perception.depth_camera.regions import Mask, filter_median
@@ -24,7 +24,7 @@ _BEST = 4
 """Starts that are followed further: one fit in some ends beside the true place, so never only one."""
 _WIDTH_M = 0.0015
 """Points this far away from a surface are half doubted; three standard deviations if that is more."""
-_WELL_SEEN = frozen([0.001] * 3 + [np.radians(1.0)] * 3, 6)
+_WELL_SEEN = copy_frozen([0.001] * 3 + [np.radians(1.0)] * 3, 6)
 """A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
 _WIDE_M = 0.012
 """The width at which a fit begins; it is narrowed from there, so that no end of a part is left behind."""
@@ -137,7 +137,7 @@ def compare_models(models: Mapping[str, Model], appearance: Appearance, points: 
 
 def _fine(surface: Surface, appearance: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
     """The last fit, from a good start, and its covariance."""
-    T = refine(surface, points, T[None], appearance.width_m, 20).T[0]
+    T = refine_fit(surface, points, T[None], appearance.width_m, 20).T[0]
     return T, covariance(surface, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
 
 
@@ -145,11 +145,11 @@ def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
     surface = model.surface
     wide = max(_WIDE_M, 3.0 * appearance.width_m)
-    first = refine(surface, points.thinned(_COARSE), guess_poses(surface.corners, points.at, model.same), wide, 10)
+    first = refine_fit(surface, points.thinned(_COARSE), guess_poses(surface.corners, points.at, model.same), wide, 10)
     best = first.T[np.argsort(first.cost, kind="stable")[:_BEST]]
     middle = points.thinned(_MIDDLE)
-    nearer = refine(surface, middle, best, np.sqrt(appearance.width_m * wide), 8)
-    return refine(surface, middle, nearer.T, appearance.width_m, 8)
+    nearer = refine_fit(surface, middle, best, np.sqrt(appearance.width_m * wide), 8)
+    return refine_fit(surface, middle, nearer.T, appearance.width_m, 8)
 
 
 def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, float]:

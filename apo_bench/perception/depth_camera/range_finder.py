@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
@@ -26,7 +26,7 @@ class PinholeView:
     """Vertical opening angle."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_world_view", frozen(self.T_world_view, 4, 4))
+        object.__setattr__(self, "T_world_view", copy_frozen(self.T_world_view, 4, 4))
 
     @property
     def origin(self) -> Array:
@@ -42,7 +42,7 @@ class PinholeView:
         x = (u + 0.5 - self.width / 2) / focal
         y = (v + 0.5 - self.height / 2) / focal
         rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
-        return frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+        return copy_frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 class RangeImage(NamedTuple):

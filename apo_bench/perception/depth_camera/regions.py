@@ -29,7 +29,7 @@ class Regions(NamedTuple):
     """Something that was nearer is gone."""
 
 
-def find_regions(before: Array, after: Array, noise_m: float) -> Regions:
+def find_changed_regions(before: Array, after: Array, noise_m: float) -> Regions:
     """Compare two range images (height, width) of one view, NaN where nothing was measured, [m].
 
     Lines that are few pixels wide are dropped: they are the edges of parts that were moved a little, which go

@@ -7,13 +7,13 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.geometry import Array, frozen
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.perception.depth_camera.follow import Event, Expected, follow_demonstration
 from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.perception.depth_camera.rays import MakeRayCaster
 from apo_bench.perception.observation.models import floor_covariance
 
-_UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
+_UNSEEN = copy_frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
 """The covariance that stands beside an operation that was not seen, [m, rad]."""
 
 

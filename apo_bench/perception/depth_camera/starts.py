@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from apo_bench.geometry import Array, quarter_turns
+from apo_bench.geometry import Array, list_quarter_turns
 
 _EDGE = 0.01
 """Share of the points beyond either end of their extent: noise makes regions larger than parts."""
@@ -26,7 +26,7 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
     s = np.sin(turn)
     Z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     low, high = np.quantile(points @ Z, (_EDGE, 1.0 - _EDGE), axis=0)
-    turns = keep_distinct(quarter_turns(), same)
+    turns = keep_distinct(list_quarter_turns(), same)
     T = np.tile(np.eye(4), (len(turns), 1, 1))
     for start, R in zip(T, turns, strict=True):
         turned = corners @ R.T

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.errors import missing_package
-from apo_bench.geometry import Array, Piece, all_corners, pose, union_mesh
+from apo_bench.geometry import Array, Piece, build_union_mesh, collect_corners, pose
 
 _SPACING_M = 0.001
 """Between points, on average."""
@@ -58,9 +58,9 @@ def sample_surface(pieces: tuple[Piece, ...]) -> Surface:
     """The surface of a union of pieces; the same pieces give the same points."""
     from trimesh.sample import sample_surface as sample
 
-    mesh = union_mesh(pieces)
+    mesh = build_union_mesh(pieces)
     points, triangle = sample(mesh, min(_MOST_POINTS, round(mesh.area / _SPACING_M**2)), seed=0)
-    return Surface(np.asarray(points), np.asarray(mesh.face_normals)[triangle], all_corners(pieces)[0])
+    return Surface(np.asarray(points), np.asarray(mesh.face_normals)[triangle], collect_corners(pieces)[0])
 
 
 def join_surfaces(posed: Iterable[tuple[Surface, Array]]) -> Surface:

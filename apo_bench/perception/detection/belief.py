@@ -10,7 +10,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Observation, Poses, joint_covariance
+from apo_bench.assembly import Assembly, Observation, Poses, compute_joint_covariance
 from apo_bench.geometry import Array, pose
 
 
@@ -70,5 +70,5 @@ class Belief:
 
 def initial_belief(observation: Observation) -> Belief:
     """What an observation says before any contact is known."""
-    covariance = joint_covariance(observation.poses, observation.covariance, observation.shared)
+    covariance = compute_joint_covariance(observation.poses, observation.covariance, observation.shared)
     return Belief(observation.assembly, observation.start, observation.poses, covariance)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Facing, Observation, PartFace
+from apo_bench.assembly import Contact, FacingPair, Observation, PartFace
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
 
@@ -17,7 +17,7 @@ class Candidate(NamedTuple):
     """A pair of faces that may touch."""
 
     contact: Contact
-    pair: Facing
+    pair: FacingPair
     slope: Array
     """(r, 6 n): derivative of its residual by body twists of all poses; r is 3 of flat faces."""
     noise: Array
@@ -44,7 +44,7 @@ class Candidate(NamedTuple):
 
 
 def judge_pair(
-    seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: Facing, slope: Array, C: Array
+    seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: FacingPair, slope: Array, C: Array
 ) -> Candidate | None:
     """A pair of faces of parts a and b as a candidate that gains nothing yet; None beyond the thresholds.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Contact, Facing, Observation, placements
+from apo_bench.assembly import Contact, FacingPair, Observation, compute_placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
@@ -24,7 +24,7 @@ from apo_bench.perception.detection.evidence import (
     DetectedContacts,
     Evidence,
     collect_evidence,
-    with_contacts,
+    keep_evident_contacts,
     without_contacts,
 )
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
@@ -35,22 +35,27 @@ _BEGINNINGS = 12
 
 @check_arguments
 def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> DetectedContacts:
-    """Detect the face contacts of every operation; those of the observation itself are ignored.
+    """Detect the face contacts of every operation from the observed poses.
 
-    Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
-    contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
+    The contacts of the observation itself are ignored. Each operation is tested for contacts of the parts that it moves
+    with the parts that it does not move, so carried parts keep their contacts. Operations that were not observed, and
+    those that depend on them, make no contact.
 
     Args:
-        rules: `RULES_BY_NOISE` of `apo_bench.perception.detection.thresholds`, or your own.
+        observation: From `observe` or `read_observation`.
+        rules: Thresholds. Default: those that follow from the stated noise.
+
+    Returns:
+        The observation with the detected contacts, and the evidence for each.
 
     Raises:
-        InputError: Something else was given.
+        InputError: An argument has another type.
     """
     observation = without_contacts(observation)
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    is_uncorrected = placements(assembly, observation.start, belief.poses)
+    is_uncorrected = compute_placements(assembly, observation.start, belief.poses)
     standing = set(assembly.fixed)
     for k, (operation, poses) in enumerate(zip(assembly.operations, is_uncorrected, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
@@ -59,7 +64,7 @@ def detect_contacts(observation: Observation, rules: Rules = RULES_BY_NOISE) -> 
         belief = best.belief
         evidence += collect_evidence(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
-    return DetectedContacts(with_contacts(assembly, evidence), tuple(evidence))
+    return DetectedContacts(keep_evident_contacts(assembly, evidence), tuple(evidence))
 
 
 class _Found(NamedTuple):
@@ -121,7 +126,7 @@ class _Around:
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
+    def _judged(self, a: str, b: str, pair: FacingPair, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         # Body twists of all poses -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])

@@ -20,15 +20,15 @@ import numpy as np
 from apo_bench.assembly import (
     Assembly,
     Observation,
-    contact_equations,
-    contact_pattern,
-    joint_covariance,
+    build_contact_equations,
+    compute_joint_covariance,
+    find_contact_pattern,
     project_round_faces,
 )
-from apo_bench.geometry import Array, frozen, pose, right_jacobian
+from apo_bench.geometry import Array, compute_right_jacobian, copy_frozen, pose
 from apo_bench.perception.detection.thresholds import CONTACT_SOFT_M
 
-_ROOM = frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
+_ROOM = copy_frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
 """(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
 _CARRIED = 3.0
 """So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
@@ -63,17 +63,17 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimat
         begin: (n, 4, 4), poses to begin with.
     """
     n = len(begin)
-    C = joint_covariance(seen.poses, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
+    C = compute_joint_covariance(seen.poses, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
     room = C + np.diag(np.tile(_ROOM**2, n))
     back = pose.inverse(seen.poses[:n])
     poses = begin
-    system = contact_equations(assembly, seen.start, begin)
+    system = build_contact_equations(assembly, seen.start, begin)
     S = _softness(assembly, seen.play_m)
     xi = pose.log(back @ poses)
     for _ in range(_TURNS):
         # Poses are seen.poses exp(xi); equations are linear in body twists at the poses, which are Jr d(xi).
         e, J = system.linearise(poses)
-        Jr = right_jacobian(xi)
+        Jr = compute_right_jacobian(xi)
         J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
         CJ = C @ J.T
         r = J @ xi.ravel() - e
@@ -108,5 +108,5 @@ def _softness(assembly: Assembly, play_m: float) -> Array:
         for contact in operation.contacts:
             carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2
             each.append(CONTACT_SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
-    count = np.diff(contact_pattern(assembly).begin)
+    count = np.diff(find_contact_pattern(assembly).begin)
     return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
-from apo_bench.assembly import Assembly, Contact, Facing, Observation, Poses, face_gap
+from apo_bench.assembly import Assembly, Contact, FacingPair, Observation, Poses, measure_face_gap
 from apo_bench.perception.detection.thresholds import PairThresholds
 
 
@@ -49,10 +49,10 @@ class DetectedContacts:
 
 def without_contacts(observation: Observation) -> Observation:
     """What was seen, with no contact of any operation."""
-    return replace(observation, assembly=replace(with_contacts(observation.assembly, ()), gaps={}))
+    return replace(observation, assembly=replace(keep_evident_contacts(observation.assembly, ()), gaps={}))
 
 
-def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
+def keep_evident_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
     """The assembly whose operations make the contacts that the evidence is of, in its order."""
     contacts: list[list[Contact]] = [[] for _ in assembly.operations]
     for each in evidence:
@@ -65,7 +65,7 @@ def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
 
 
 def collect_evidence(
-    assembly: Assembly, k: int, taken: Iterable[tuple[Contact, Facing, PairThresholds]], is_uncorrected: Poses
+    assembly: Assembly, k: int, taken: Iterable[tuple[Contact, FacingPair, PairThresholds]], is_uncorrected: Poses
 ) -> list[Evidence]:
     """What speaks for the contacts of operation k, in the order of parts and faces.
 
@@ -75,7 +75,7 @@ def collect_evidence(
     solids = assembly.solids
     parts = (assembly.operations[k].moves, tuple(solids))
 
-    def place(each: tuple[Contact, Facing, PairThresholds]) -> list[int]:
+    def place(each: tuple[Contact, FacingPair, PairThresholds]) -> list[int]:
         return [
             i
             for of, among in zip(each[0], parts, strict=True)
@@ -85,6 +85,8 @@ def collect_evidence(
     evidence = list[Evidence]()
     for contact, pair, most in sorted(taken, key=place):
         a, b = contact
-        seen_gap_m = face_gap(assembly.face_of(a), is_uncorrected[a.part], assembly.face_of(b), is_uncorrected[b.part])
+        seen_gap_m = measure_face_gap(
+            assembly.face_of(a), is_uncorrected[a.part], assembly.face_of(b), is_uncorrected[b.part]
+        )
         evidence.append(Evidence(contact, k, pair.gap_m, pair.angle_rad, pair.share, most, seen_gap_m))
     return evidence

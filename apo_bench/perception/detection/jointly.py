@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Assembly, Contact, Observation, placements
+from apo_bench.assembly import Assembly, Contact, Observation, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.perception.detection.candidate import Candidate
 from apo_bench.perception.detection.estimate import estimate
@@ -24,7 +24,7 @@ from apo_bench.perception.detection.evidence import (
     DetectedContacts,
     Rival,
     collect_evidence,
-    with_contacts,
+    keep_evident_contacts,
     without_contacts,
 )
 from apo_bench.perception.detection.physics import IMPOSSIBLE, inside, physical_surprise, refusal
@@ -207,7 +207,7 @@ def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
     """The best of the histories, with how likely it is, and the next best one."""
     weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
-    is_uncorrected = placements(seen.assembly, seen.start, seen.poses)
+    is_uncorrected = compute_placements(seen.assembly, seen.start, seen.poses)
     evidence = [
         [
             each
@@ -216,5 +216,5 @@ def _recognised(seen: Observation, kept: list[_History]) -> DetectedContacts:
         ]
         for history in kept[:2]
     ]
-    rival = Rival(with_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
-    return DetectedContacts(with_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)
+    rival = Rival(keep_evident_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
+    return DetectedContacts(keep_evident_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)

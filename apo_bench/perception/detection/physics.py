@@ -11,7 +11,7 @@ from math import exp, hypot, log, sqrt
 import numpy as np
 from scipy.special import log_ndtr, ndtr
 
-from apo_bench.geometry import Array, Overlap, face_area, overlap, pose, ways_out
+from apo_bench.geometry import Array, Overlap, compute_overlap, find_ways_out, measure_face_area, pose
 from apo_bench.perception.detection.candidate import Candidate
 from apo_bench.perception.detection.situation import Situation
 from apo_bench.perception.detection.thresholds import Rules
@@ -70,7 +70,7 @@ def inside(at: Situation, rules: Rules, taken: Collection[Candidate], a: str, b:
     solids = at.seen.assembly.solids
     worst = 0.0
     mine = [c for c in taken if c.parts == (a, b)]
-    for directions, lengths, middle in ways_out(solids[a], at.now.poses[a], solids[b], at.now.poses[b], _SOFT_M):
+    for directions, lengths, middle in find_ways_out(solids[a], at.now.poses[a], solids[b], at.now.poses[b], _SOFT_M):
         deviations = np.sqrt(at.variances(a, b, directions, middle) + _SOFT_M**2 + at.seen.play_m**2)
         worst = max(worst, _least_unlikely(at, rules, mine, directions, lengths, deviations))
     return worst
@@ -98,14 +98,16 @@ def _covers(at: Situation, rules: Rules, c: Candidate, moved: Array) -> bool:
     if at.seen.assembly.is_round(c.contact):
         return True
     least = rules.share if moved.any() else rules.share / 2
-    return _overlap(at, c, moved).area >= least * min(face_area(at.seen.assembly.face(face)) for face in c.contact)
+    return _overlap(at, c, moved).area >= least * min(
+        measure_face_area(at.seen.assembly.face(face)) for face in c.contact
+    )
 
 
 def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap:
     m, e = c.contact
     there = np.array(at.now.poses[m.part])
     there[:3, 3] += 0.0 if moved is None else moved
-    return overlap(at.seen.assembly.face(m), there, at.seen.assembly.face(e), at.now.poses[e.part])
+    return compute_overlap(at.seen.assembly.face(m), there, at.seen.assembly.face(e), at.now.poses[e.part])
 
 
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:

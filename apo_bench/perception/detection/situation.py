@@ -8,7 +8,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Facing, Observation
+from apo_bench.assembly import Contact, FacingPair, Observation
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.detection.belief import Belief, PartBeliefs
@@ -81,7 +81,7 @@ class Situation:
                 candidates += self._judged(rules, a, b, pair)
         return tuple(candidates)
 
-    def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
+    def _judged(self, rules: Rules, a: str, b: str, pair: FacingPair) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         J = pair.slope @ self._reach(a, b)
         C = J @ self.estimate.covariance @ J.T

@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Facing
+from apo_bench.assembly import FacingPair
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 
@@ -84,12 +84,12 @@ def _longest(miss: float, covariance: Array, soft: float) -> float:
     return math.sqrt(_quantile(miss, len(covariance)) * (worst + soft**2))
 
 
-def slack(pair: Facing, play_m: float) -> PairThresholds:
+def slack(pair: FacingPair, play_m: float) -> PairThresholds:
     """How far off a contact with this play can be: from side to side, and tilted from corner to corner."""
     return PairThresholds(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
 
 
-def reality(pair: Facing, play_m: float) -> Array:
+def reality(pair: FacingPair, play_m: float) -> Array:
     """(3, 3), covariance of gap and tilts of a contact that is there: uniform within its play, and a little soft.
 
     (r, r) of round faces.

@@ -22,16 +22,16 @@ Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 """Any function `(assembly, shown, rng) -> Observation` is a noise model."""
 NOISES = MappingProxyType(
     {
-        "isotropic": "apo_bench.perception.observation.models.isotropic:Isotropic",
-        "anisotropic": "apo_bench.perception.observation.models.sighted:Anisotropic",
-        "per-part": "apo_bench.perception.observation.models.isotropic:PerPart",
-        "camera": "apo_bench.perception.observation.models.sighted:Sighted",
-        "heavy-tailed": "apo_bench.perception.observation.models.isotropic:HeavyTailed",
-        "outliers": "apo_bench.perception.observation.models.outliers:Outliers",
-        "bias": "apo_bench.perception.observation.models.shared:Bias",
-        "bias-view": "apo_bench.perception.observation.models.shared:BiasView",
-        "correlated": "apo_bench.perception.observation.models.shared:Correlated",
-        "symmetric": "apo_bench.perception.observation.models.symmetric:Symmetric",
+        "isotropic": "apo_bench.perception.observation.models.isotropic:IsotropicNoise",
+        "anisotropic": "apo_bench.perception.observation.models.sighted:AnisotropicNoise",
+        "per-part": "apo_bench.perception.observation.models.isotropic:PerPartNoise",
+        "camera": "apo_bench.perception.observation.models.sighted:CameraNoise",
+        "heavy-tailed": "apo_bench.perception.observation.models.isotropic:HeavyTailedNoise",
+        "outliers": "apo_bench.perception.observation.models.outliers:OutlierNoise",
+        "bias": "apo_bench.perception.observation.models.shared:BiasNoise",
+        "bias-view": "apo_bench.perception.observation.models.shared:ViewBiasNoise",
+        "correlated": "apo_bench.perception.observation.models.shared:CorrelatedNoise",
+        "symmetric": "apo_bench.perception.observation.models.symmetric:SymmetricNoise",
         **dict.fromkeys(FAILURES, "apo_bench.perception.observation.models.failures:make_failures"),
     }
 )

@@ -9,18 +9,18 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import require
-from apo_bench.io import Table, Text, read_typed, toml_text
+from apo_bench.io import FileTable, Text, format_toml, read_typed
 from apo_bench.perception.observation.models import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
     Camera,
-    Empirical,
-    Fitted,
+    EmpiricalNoise,
+    FittedNoise,
     MeasuredNoise,
     NoiseLevel,
     Split,
     Tail,
-    empirical_noise,
+    load_empirical_noise,
 )
 from apo_bench.records import RESIDUALS
 from apo_bench.resources import folder
@@ -42,7 +42,7 @@ def _split_table(name: str, unit: str) -> Any:
         (f"along_scale_{unit}", float),
         ("along_degrees_of_freedom", _Freedom),
     ]
-    return msgspec.defstruct(name, fields, bases=(Table,), frozen=True)
+    return msgspec.defstruct(name, fields, bases=(FileTable,), frozen=True)
 
 
 ShiftTable = _split_table("ShiftTable", "mm")
@@ -51,7 +51,7 @@ TurnTable = _split_table("TurnTable", "deg")
 """`[turn]`."""
 
 
-class NoiseTable(Table, frozen=True, kw_only=True):
+class NoiseFileTable(FileTable, frozen=True, kw_only=True):
     """A whole file."""
 
     schema: Literal["apo-bench/noise/2"]
@@ -81,7 +81,7 @@ def noise_path(name: str) -> Path | None:
     return presets().get(name)
 
 
-def noise_of_file(name: str, noise_level: NoiseLevel) -> Fitted | Empirical | None:
+def noise_of_file(name: str, noise_level: NoiseLevel) -> FittedNoise | EmpiricalNoise | None:
     """Make the noise model of such a name, None if it is no such name.
 
     Raises:
@@ -91,9 +91,9 @@ def noise_of_file(name: str, noise_level: NoiseLevel) -> Fitted | Empirical | No
     if path is None:
         return None
     if name.startswith(RESIDUALS):
-        return empirical_noise(path, noise_level)
+        return load_empirical_noise(path, noise_level)
     measured, camera = read_noise(path)
-    return Fitted(measured, noise_level, camera)
+    return FittedNoise(measured, noise_level, camera)
 
 
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
@@ -102,7 +102,7 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
     """
-    top = read_typed(path, NoiseTable, "noise file")
+    top = read_typed(path, NoiseFileTable, "noise file")
     shift = _split(top.shift, f"{path}, shift", 1000.0)
     far = top.outlier_farthest_mm
     require(far >= shift.limit, f"{path}, outlier_farthest_mm: the limit of the shift or more is needed, not {far:g}.")
@@ -141,7 +141,7 @@ def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
         "shift": _split_form(measured.shift_mm, "mm"),
         "turn": _split_form(measured.turn_deg, "deg"),
     }
-    return "".join(f"# {note}\n" for note in notes) + toml_text(document)
+    return "".join(f"# {note}\n" for note in notes) + format_toml(document)
 
 
 def _split_form(split: Split, unit: str) -> dict[str, float]:

@@ -10,7 +10,7 @@ from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
 from apo_bench.geometry import is_rigid
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
-from apo_bench.records import noise_pair
+from apo_bench.records import parse_noise_level
 
 
 @check_arguments
@@ -21,20 +21,24 @@ def observe(
     *,
     noise_level: float | tuple[float, float] | None = None,
 ) -> Observation:
-    """What the noise model makes of a demonstration, checked.
+    """Observe a demonstration through a noise model.
 
     Args:
-        noise: A name, `"package.module:name"`, a noise file or a class, which are made with the level; or a function
-            `(assembly, demonstration, rng) -> Observation`. See `make_noise`.
+        demonstration: From `demonstrate`.
+        noise: A name (`apo-bench noise list`), `"package.module:name"`, a noise file or a class, made with the noise
+            level; or a function `(assembly, demonstration, rng) -> Observation`.
         rng: The only source of chance.
-        level: Standard deviation in mm and degrees, one number for both or a pair; 1 if it is not given.
+        noise_level: Standard deviation per axis in mm and degrees, one number for both or a pair. Default: 1.
+
+    Returns:
+        Noisy poses with their stated covariance.
 
     Raises:
-        InputError: There is no such noise model, it raised an error, it returned what is not an observation of this
-            demonstration, or a level was given for a noise model that is made already.
+        InputError: Unknown noise model; it raised an error or returned no observation of this demonstration; or a
+            noise level was given with a function.
     """
     if isinstance(noise, str | type):
-        noise = make_noise(noise, NoiseLevel(*noise_pair(1.0 if noise_level is None else noise_level)))
+        noise = make_noise(noise, NoiseLevel(*parse_noise_level(1.0 if noise_level is None else noise_level)))
     elif noise_level is not None:
         raise InputError(
             f"the level {noise_level!r} was given together with a noise model that is made already; leave it out, "

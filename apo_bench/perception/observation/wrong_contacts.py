@@ -22,18 +22,18 @@ from apo_bench.assembly import (
     Observation,
     PartFace,
     Poses,
-    contact_kind,
+    build_relation_graph,
+    classify_contact,
+    compute_placements,
     faces_oppose,
-    height,
+    find_round_pairs,
+    measure_height,
     measure_round,
-    placements,
-    relation_graph,
-    round_pairs,
 )
 from apo_bench.errors import RAISED, InputError, failed, require
-from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
+from apo_bench.geometry import Array, Face, RoundFace, Solid, compute_overlap
 from apo_bench.names import resolve
-from apo_bench.records import GIVEN, SHIFT_MM, WRONG_CONTACTS, contact_source_name
+from apo_bench.records import GIVEN, SHIFT_MM, WRONG_CONTACTS, normalise_contact_source
 
 ContactSource = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, poses, rng) -> Assembly`: right contacts and poses in, wrong contacts out."""
@@ -58,7 +58,9 @@ def make_contacts(given: Any) -> ContactSource | None:
     Raises:
         InputError: There is no such thing.
     """
-    name = contact_source_name(given) if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
+    name = (
+        normalise_contact_source(given) if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
+    )
     if name == GIVEN:
         return None
     if isinstance(given, str) and name.startswith("shifted:"):
@@ -71,7 +73,7 @@ def make_contacts(given: Any) -> ContactSource | None:
     return source
 
 
-def with_contacts(
+def replace_contacts(
     observation: Observation, source: ContactSource | None, truth: Array, rng: np.random.Generator
 ) -> Observation:
     """Return an observation with wrong contacts in place of the right ones.
@@ -107,14 +109,14 @@ def _complaint(right: Assembly, wrong: Any) -> str:
         for part, face in relation.contact:
             if part not in wrong.solids or face not in {**wrong.solids[part].faces, **wrong.solids[part].rounds}:
                 return f"returned a contact of {part}.{face}, which is no face; name faces that the solids have"
-        if contact_kind(*(wrong.face_of(of) for of in relation.contact)) is None:
+        if classify_contact(*(wrong.face_of(of) for of in relation.contact)) is None:
             return f"returned the contact {relation.contact}, which faces of these kinds cannot make; name others"
     return ""
 
 
 def culprit(right: Assembly, wrong: Assembly) -> str | None:
     """The relation (R1, R2, ... of the wrong graph) with a contact that is not a right one; None if there is none."""
-    arcs = relation_graph(wrong).arcs
+    arcs = build_relation_graph(wrong).arcs
     return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
@@ -184,19 +186,19 @@ def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
 def _facing(assembly: Assembly, start: Poses, poses: Array) -> Iterator[_Pair]:
     """Faces of parts that an operation moved, and faces of those that stand there, apart by more than nothing."""
     standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
-    for k, stage in enumerate(placements(assembly, start, poses)):
+    for k, stage in enumerate(compute_placements(assembly, start, poses)):
         moves = assembly.operations[k].moves
         standing |= dict.fromkeys(moves)
         for part in moves:
             for other in (p for p in standing if p not in moves):
                 for a, b in product(assembly.solids[part].faces.values(), assembly.solids[other].faces.values()):
                     contact = Contact(PartFace(part, a.name), PartFace(other, b.name))
-                    apart = height(a, stage[part], b, stage[other])
+                    apart = measure_height(a, stage[part], b, stage[other])
                     near = apart > TOUCHING_M and faces_oppose(a, stage[part], b, stage[other], _OPPOSED_RAD)
                     if near and contact not in assembly.operations[k].contacts:
-                        area = overlap(a, stage[part], b, stage[other]).area
+                        area = compute_overlap(a, stage[part], b, stage[other]).area
                         yield _Pair(k, contact, apart, area > _COVERED_M2)
-                for c, d in round_pairs(assembly.solids[part], assembly.solids[other]):
+                for c, d in find_round_pairs(assembly.solids[part], assembly.solids[other]):
                     contact = Contact(PartFace(part, c.name), PartFace(other, d.name))
                     measured = measure_round(c, stage[part], d, stage[other])
                     near = measured.angle_rad < _OPPOSED_RAD and measured.gap_m > TOUCHING_M

@@ -8,10 +8,18 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, TouchedContact, corners, mouth, touched_contacts
-from apo_bench.geometry import Array, Posed, exit_distance, extent, freeze, is_way_free
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Poses,
+    TouchedContact,
+    find_touch_points,
+    find_touched_contacts,
+    measure_entrance_depth,
+)
+from apo_bench.geometry import Array, PosedPieces, compute_exit_distance, freeze, is_way_free, measure_extent
 from apo_bench.planning.insertion.attach import ANY, Attach, Preference
-from apo_bench.planning.insertion.macros import UP, Chain, Macro, Way, chain, departure
+from apo_bench.planning.insertion.macros import UP, Chain, Macro, StraightExit, chain, departure
 from apo_bench.planning.insertion.states import (
     ANGLE_RAD,
     ContactState,
@@ -101,10 +109,12 @@ def arrive(
         angle_rad: Normals this near to parallel are; more than rounding where poses were only seen.
     """
     T = poses[moves[0]]
-    touched = tuple(touched_contacts(assembly, contacts, moves, poses))
+    touched = tuple(find_touched_contacts(assembly, contacts, moves, poses))
     normals = _normals(touched, angle_rad)
-    moving = [Posed(assembly.solids[part].pieces, poses[part]) for part in moves]
-    resting = {part: Posed(solid.pieces, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
+    moving = [PosedPieces(assembly.solids[part].pieces, poses[part]) for part in moves]
+    resting = {
+        part: PosedPieces(solid.pieces, poses[part]) for part, solid in assembly.solids.items() if part not in moves
+    }
     direction = stated.direction
     if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
         direction = None
@@ -113,7 +123,7 @@ def arrive(
         return is_way_free(moving, way, length_m, list(resting.values()))
 
     def clear(way: Array, length_m: float) -> bool:
-        begin = [Posed(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
+        begin = [PosedPieces(posed.pieces, _shift(posed.T, length_m * way)) for posed in moving]
         return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
@@ -121,18 +131,18 @@ def arrive(
         millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3))
         return max(_TRAVEL_M, millimetres) if stated.travel_m is None else stated.travel_m
 
-    def out(along: Array, walls: tuple[int, ...]) -> Way:
+    def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]
         there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
 
         def length(u: Array) -> float:
             ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
-            return max(exit_distance(moving, u, around), *ends)
+            return max(compute_exit_distance(moving, u, around), *ends)
 
-        ways = list[Way]()
+        ways = list[StraightExit]()
         for u in there:
-            ways.append(Way(u, length(u), False))
+            ways.append(StraightExit(u, length(u), False))
             if clear(u, reach(ways[-1].length_m)):
                 return ways[-1]._replace(free=True)
         return ways[0]
@@ -162,18 +172,20 @@ def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Arra
     if touched.points is None:
         return 0.0
     m, e = touched.contact
-    return mouth(assembly, *((e, m) if touched.rests == m.part else (m, e)), poses, -way)
+    return measure_entrance_depth(assembly, *((e, m) if touched.rests == m.part else (m, e)), poses, -way)
 
 
-def _past(moving: Sequence[Posed], way: Array, roofs: Sequence[Posed]) -> float:
+def _past(moving: Sequence[PosedPieces], way: Array, roofs: Sequence[PosedPieces]) -> float:
     """How far parts must be moved until no roof is above any of them, at most, [m]."""
-    ends = [[np.add(extent(p.pieces, p.T[:3, :3].T @ way), p.T[:3, 3] @ way) for p in of] for of in (moving, roofs)]
+    ends = [
+        [np.add(measure_extent(p.pieces, p.T[:3, :3].T @ way), p.T[:3, 3] @ way) for p in of] for of in (moving, roofs)
+    ]
     return max(0.0, float(np.max(ends[1]) - np.min(ends[0]))) if roofs and abs(way @ UP) < 0.5 else 0.0
 
 
 def turning_state(assembly: Assembly, arrival: Arrival, poses: Poses) -> Screw:
     """The state of what has arrived if it may also turn; `poses` as it was understood at."""
-    return screw_state(*corners(assembly, arrival.touched, poses))
+    return screw_state(*find_touch_points(assembly, arrival.touched, poses))
 
 
 def _readable(basis: Array, T: Array) -> Array:

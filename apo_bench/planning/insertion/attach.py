@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
-from apo_bench.geometry import Array, copyable, freeze
+from apo_bench.geometry import Array, freeze, make_copyable
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Attach:
     """The straight line on which a part comes to its goal."""

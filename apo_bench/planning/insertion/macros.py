@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.geometry import Array, frozen
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.planning.insertion.states import ANGLE_RAD, Cone, ContactState, classify, evenly_open, null_space
 
 MacroName = Literal[
@@ -43,7 +43,7 @@ class Macro:
     """How far it goes; None: until contact is felt."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", frozen(np.asarray(self.direction) + 0.0, 3))
+        object.__setattr__(self, "direction", copy_frozen(np.asarray(self.direction) + 0.0, 3))
 
     @property
     def inserts(self) -> bool:
@@ -89,7 +89,7 @@ def peel(rows: Array) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-class Way(NamedTuple):
+class StraightExit(NamedTuple):
     """A straight way out."""
 
     direction: Array
@@ -100,7 +100,7 @@ class Way(NamedTuple):
     """Whether nothing else is in the way."""
 
 
-_Out = Callable[[Array, tuple[int, ...]], Way]
+_Out = Callable[[Array, tuple[int, ...]], StraightExit]
 """Chooses how a part leaves between walls: the directions in which all stay closed, (m, 3), and the walls by number."""
 
 
@@ -110,7 +110,7 @@ class Chain(NamedTuple):
     state: ContactState
     """When all are made."""
     macros: tuple[Macro, ...]
-    way: Way | None
+    way: StraightExit | None
     """Along which it leaves walls; None if it is enclosed by none, or if it is locked."""
     locked: bool
     """Whether no straight motion leads there."""
@@ -129,7 +129,7 @@ def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
     if layers and layers[-1].locked:
         return Chain(state, (), None, True)
     macros: list[Macro] = []
-    way: Way | None = None
+    way: StraightExit | None = None
     for layer in reversed(layers):
         if layer.slides_out:
             way = out(null_space(normals[list(layer.breaks)]), layer.breaks)
@@ -159,7 +159,7 @@ def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     return tuple(back)
 
 
-def _insertion(layer: Layer, layers: Sequence[Layer], way: Way) -> Macro:
+def _insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macro:
     """The motion between walls: along an axis, with a floor at the end, or between two planes."""
     name: MacroName = "insert-into"
     if layer.cone.state.constraining == 1:

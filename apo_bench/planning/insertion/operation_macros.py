@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly import Assembly, Contact, Poses, placements
+from apo_bench.assembly import Assembly, Contact, Poses, compute_placements
 from apo_bench.geometry import Array
 from apo_bench.planning.insertion.arrival import Arrival, arrive
 from apo_bench.planning.insertion.attach import ANY, Preference
@@ -53,7 +53,7 @@ def understand(
             is not.
         angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
     """
-    stages = (start, *placements(assembly, start, goals))
+    stages = (start, *compute_placements(assembly, start, goals))
     lines = tuple(stated) or (ANY,) * len(assembly)
     understood: list[OperationMacros] = []
     put: dict[str, int] = {}

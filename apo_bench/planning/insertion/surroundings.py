@@ -2,8 +2,16 @@
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Meetings, Poses, mouth, outline_points, touched_contacts
-from apo_bench.geometry import Array, Face, extent
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Meetings,
+    Poses,
+    find_touched_contacts,
+    list_outline_points,
+    measure_entrance_depth,
+)
+from apo_bench.geometry import Array, Face, measure_extent
 from apo_bench.planning.insertion.arrival import Arrival
 
 _SLOW_M = 0.003
@@ -32,7 +40,9 @@ def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
     contact = arrival.touched[i].contact
     rests = arrival.touched[i].rests
     place = sum(each.contact == contact for each in arrival.touched[:i])
-    return touched_contacts(assembly, [contact], [of.part for of in contact if of.part != rests], poses)[place].normal
+    return find_touched_contacts(assembly, [contact], [of.part for of in contact if of.part != rests], poses)[
+        place
+    ].normal
 
 
 def _walls(arrival: Arrival) -> tuple[Contact, ...]:
@@ -51,15 +61,17 @@ def slow_before(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) 
 def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> float:
     """How much of a way the faces of a contact have in common, [m]; 0 if nothing."""
     if assembly.is_round(contact):
-        ends = [outline_points(assembly, of, poses) @ way for of in contact]
+        ends = [list_outline_points(assembly, of, poses) @ way for of in contact]
         return max(0.0, float(min(end.max() for end in ends) - max(end.min() for end in ends)))
-    corners = Meetings(assembly).overlaps([(contact, poses)])[0].corners
+    corners = Meetings(assembly).measure_overlaps([(contact, poses)])[0].corners
     return float(np.ptp(corners @ way)) if len(corners) else 0.0
 
 
 def mouths(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
     """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
-    return tuple(sorted({mouth(assembly, *contact, poses, way) for contact in _walls(arrival)}, reverse=True))
+    return tuple(
+        sorted({measure_entrance_depth(assembly, *contact, poses, way) for contact in _walls(arrival)}, reverse=True)
+    )
 
 
 def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
@@ -89,7 +101,7 @@ def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str
 def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
     """The top of what stands, and the bottom of what moves, [m]."""
     ends = {
-        part: np.add(extent(solid.pieces, poses[part][2, :3]), poses[part][2, 3]).tolist()
+        part: np.add(measure_extent(solid.pieces, poses[part][2, :3]), poses[part][2, 3]).tolist()
         for part, solid in assembly.solids.items()
     }
     top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)

@@ -10,11 +10,11 @@ from apo_bench.assembly import Assembly, Operation, Poses
 from apo_bench.geometry import (
     Array,
     Solid,
-    ball_around,
-    intrusion_depths,
-    physical_pieces,
+    enclose_in_ball,
+    measure_intrusion_depths,
     pose,
-    remembered,
+    remember,
+    shrink_pieces,
 )
 from apo_bench.planning.insertion.attach import Attach
 
@@ -31,11 +31,11 @@ FAR_M = 0.01
 Solids = Mapping[str, Solid]
 
 
-@remembered
+@remember
 def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
     """The parts as they are made, fit faces receded; the same ones each time."""
     made = {
-        name: replace(solid, pieces=physical_pieces(solid, clearance_mm * 1e-3))
+        name: replace(solid, pieces=shrink_pieces(solid, clearance_mm * 1e-3))
         for name, solid in assembly.solids.items()
     }
     return MappingProxyType(made)
@@ -79,12 +79,12 @@ def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
 
 def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float:
     """The deepest intrusion over all displacements (k, 3) of a, [m]; far off ones are skipped."""
-    middle, radius = ball_around(a.pieces)
+    middle, radius = enclose_in_ball(a.pieces)
     seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, middle[None]) + shifts)
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
     if not near.any():
         return -FAR_M
-    depths = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b, FAR_M)
+    depths = measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b, FAR_M)
     return max(-FAR_M, float(depths.max()))
 
 

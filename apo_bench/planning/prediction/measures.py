@@ -26,10 +26,10 @@ from apo_bench.assembly import (
     Operation,
     Plan,
     Poses,
-    apart_limit_mm,
-    contact_kind,
-    deep_limit_mm,
-    placements,
+    classify_contact,
+    compute_apart_limit_mm,
+    compute_deep_limit_mm,
+    compute_placements,
 )
 from apo_bench.geometry import Array, Mate
 from apo_bench.planning.insertion.attach import Attach
@@ -204,7 +204,7 @@ def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
 
 def _put(alone: Assembly, before: Poses, goal: Array) -> Poses:
     """All poses once the only operation has put its main part at a goal."""
-    return placements(alone, before, goal[None])[0]
+    return compute_placements(alone, before, goal[None])[0]
 
 
 def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
@@ -214,7 +214,7 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
     apart = list[tuple[float, float, Contact]]()
     entering = [contact for contact in act.operation.contacts if enters(act.alone, contact)]
     for contact, (deep_m, apart_m) in zip(entering, _misfits_m(act, entering, how), strict=True):
-        limit = deep_limit_mm(act.alone, contact, *lengths)
+        limit = compute_deep_limit_mm(act.alone, contact, *lengths)
         sides.append((1e3 * deep_m, limit))
         apart.append((1e3 * apart_m, limit, contact))
     worst = max(sides, key=_excess)
@@ -223,7 +223,7 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
         if size > limit:
             if size - limit <= _excess(worst) + _ROUNDING_MM:
                 continue
-            limit = apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
+            limit = compute_apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
         worst = max(worst, (size, limit), key=_excess)
     return Measure(act.number, "fit", *worst)
 
@@ -253,8 +253,8 @@ def _misfits_m(act: _Act, contacts: Sequence[Contact], how: Attach | None) -> li
     """
     way = None if how is None else act.planned[act.operation.main][:3, :3] @ how.direction
     out = []
-    for contact, lie in zip(contacts, Meetings(act.alone).lies((c, act.planned) for c in contacts), strict=True):
-        if contact_kind(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
+    for contact, lie in zip(contacts, Meetings(act.alone).measure((c, act.planned) for c in contacts), strict=True):
+        if classify_contact(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
             e, n = residual(act.alone, contact, lie, act.planned)
             along = way is not None and abs(n @ way) >= _ACROSS
             out.append((0.0, 0.0) if along else (max(0.0, -float(e.min())), max(0.0, float(e.max()))))

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Lie, Meetings, Operation, Poses, measure_mate
+from apo_bench.assembly import Assembly, Contact, Meeting, Meetings, Operation, Poses, measure_contact
 from apo_bench.geometry import Array, Face, Mate, RoundFace, pose
 
 _LEVEL = 0.5
@@ -47,11 +47,11 @@ def residuals(assembly: Assembly, contacts: Sequence[Contact], poses: Poses) -> 
     Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
     shaft on a plane the ends of the line of contact. The normal, (3,), is that of the flat face, world.
     """
-    lies = Meetings(assembly).lies((contact, poses) for contact in contacts)
+    lies = Meetings(assembly).measure((contact, poses) for contact in contacts)
     return [residual(assembly, *pair, poses) for pair in zip(contacts, lies, strict=True)]
 
 
-def residual(assembly: Assembly, contact: Contact, lie: Lie, poses: Poses) -> tuple[Array, Array]:
+def residual(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> tuple[Array, Array]:
     """`residuals` of one contact whose faces lie so to each other."""
     m, e = contact
     if isinstance(lie, Mate):
@@ -93,7 +93,7 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
-    touch = measure_mate(assembly, contact, poses)
+    touch = measure_contact(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
     off = touch.off.mean(axis=0)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Lie, Meetings, Operation, Poses, placements
-from apo_bench.geometry import Array, Face, Overlap, RoundFace, across_axis, all_boxes, pose
+from apo_bench.assembly import Assembly, Contact, Meeting, Meetings, Operation, Poses, compute_placements
+from apo_bench.geometry import Array, Face, Overlap, RoundFace, all_boxes, find_direction_across, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
@@ -46,7 +46,7 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
     Returns:
         The operation, or None if every part would stand.
     """
-    every = zip(assembly.operations, placements(assembly, start, goals), strict=True)
+    every = zip(assembly.operations, compute_placements(assembly, start, goals), strict=True)
     return next(
         (k for k, (operation, poses) in enumerate(every) if imbalance(assembly, operation, poses) > BALANCED), None
     )
@@ -77,7 +77,7 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
     from scipy.optimize import nnls
 
-    lies = Meetings(assembly).lies((contact, poses) for contact in operation.contacts)
+    lies = Meetings(assembly).measure((contact, poses) for contact in operation.contacts)
     pushing = [pushes(assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
@@ -100,7 +100,7 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
     """
     heights = [float((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) for _, e in operation.contacts]
     level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]
-    common = Meetings(assembly).overlaps(((contact, poses) for contact, _ in level))
+    common = Meetings(assembly).measure_overlaps(((contact, poses) for contact, _ in level))
     ups = [float(np.sign(up)) for _, up in level]
     points = np.concatenate([np.zeros((0, 3)), *(each.corners for each in common)])
     return points, np.repeat(ups, [len(each.corners) for each in common]), ups
@@ -148,7 +148,7 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     return np.concatenate([points, *[held] * 4]), np.concatenate([n, *(m + side for side in sides)])
 
 
-def pushes(assembly: Assembly, contact: Contact, lie: Lie, poses: Poses) -> Pushes:
+def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> Pushes:
     """What the second part of a contact, which rests, can push the first one with.
 
     Args:
@@ -186,7 +186,7 @@ def _along(n: Array, at: Array, out: float) -> Pushes:
 
 def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
     """The directions from the axis to a round wall, and those in which it pushes there, (8, 3) each."""
-    x = across_axis(axis)
+    x = find_direction_across(axis)
     around = np.outer(np.cos(_TURNS), x) + np.outer(np.sin(_TURNS), np.cross(axis, x))
     sign = -1.0 if rests.hole else 1.0
     return around, sign * (np.sqrt(1.0 - sine**2) * around - sine * axis)

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Self, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, each_line, open_to_append
-from apo_bench.records.record import Key, TrialRecord, record_key
+from apo_bench.io import check_target, open_to_append, read_lines
+from apo_bench.records.record import Key, TrialRecord, get_record_key
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import record_of, unwritable
 from apo_bench.records.secret_seed import check_same_secret_seed
@@ -45,7 +45,7 @@ class RunFolder:
                     _set_torn_line_aside(folder / name)
                 for record in each_record(folder):
                     check_same_secret_seed(f"'{folder}'", run.get("secret_seed"), record["secret_seed"])
-                    self.finished[record_key(record)] = record["config_hash"]
+                    self.finished[get_record_key(record)] = record["config_hash"]
                 if self.finished:
                     check_same(folder, run)
                 write_run(folder, run)
@@ -80,7 +80,7 @@ class RunFolder:
                 f"a record could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); {kept}, and the "
                 "same command continues once there is room."
             ) from error
-        self.finished[record_key(record)] = record["config_hash"]
+        self.finished[get_record_key(record)] = record["config_hash"]
         with suppress(OSError):
             _append(self._timing.fileno(), timing)
 
@@ -101,7 +101,7 @@ def each_record(folder: str | Path) -> Iterator[TrialRecord]:
         path.exists(),
         f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote.",
     )
-    yield from (record_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of trials"))
+    yield from (record_of(line, f"{path}, line {number}") for number, line in read_lines(path, "table of trials"))
 
 
 def _lock(file: int, folder: Path) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from apo_bench.geometry import Array
 from apo_bench.records.record import RECORD_FIELDS
 from apo_bench.records.run.run_folder import each_record
-from apo_bench.records.secret_seed import common_secret_seed
+from apo_bench.records.secret_seed import find_common_secret_seed
 from apo_bench.records.settings import SETTINGS
 
 Mask = NDArray[np.bool_]
@@ -89,7 +89,7 @@ class Trials:
         Raises:
             InputError: They were drawn with several, so that their seeds are different trials.
         """
-        return common_secret_seed({"secret_seed": secret_seed} for secret_seed in self.distinct("secret_seed"))
+        return find_common_secret_seed({"secret_seed": secret_seed} for secret_seed in self.distinct("secret_seed"))
 
     def number(self, name: str) -> Array:
         """(n,) a column of numbers."""

@@ -2,11 +2,11 @@
 
 from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.scenario.generated.names import (
+    complete_name,
     generate_assembly,
-    generated_file,
     is_generated,
-    whole_name,
+    make_generated_file,
     write_generated,
 )
 
-__all__ = ("FAMILIES", "generate_assembly", "generated_file", "is_generated", "whole_name", "write_generated")
+__all__ = ("FAMILIES", "complete_name", "generate_assembly", "is_generated", "make_generated_file", "write_generated")

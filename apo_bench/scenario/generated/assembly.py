@@ -16,7 +16,7 @@ BOARD = "board"
 Point = tuple[float, float, float]
 
 
-class Act(NamedTuple):
+class DrawnOperation(NamedTuple):
     """One operation."""
 
     part: str
@@ -38,7 +38,7 @@ class Station(NamedTuple):
     length: float
     """Room that it takes along the board."""
     parts: Mapping[str, Body]
-    acts: tuple[Act, ...]
+    acts: tuple[DrawnOperation, ...]
     bores: tuple[Bore, ...] = ()
     """Through the board."""
     bodies: tuple[Body, ...] = ()
@@ -55,10 +55,10 @@ class GeneratedAssembly(NamedTuple):
     """The board first."""
     fixed: Mapping[str, Point]
     """Where fixed parts stand."""
-    acts: tuple[Act, ...]
+    acts: tuple[DrawnOperation, ...]
 
 
-def between(rng: np.random.Generator, low: float, high: float) -> float:
+def draw_length(rng: np.random.Generator, low: float, high: float) -> float:
     """A length out of an interval, in steps of half a millimetre."""
     return float(rng.integers(round(2 * low), round(2 * high) + 1)) / 2
 
@@ -89,7 +89,7 @@ def shift_station(station: Station, x: float) -> Station:
     )
 
 
-def merge_orders(rng: np.random.Generator, orders: Sequence[Sequence[Act]]) -> tuple[Act, ...]:
+def merge_orders(rng: np.random.Generator, orders: Sequence[Sequence[DrawnOperation]]) -> tuple[DrawnOperation, ...]:
     """Operations of several stations, one after another at random, those of each in their own order."""
     turns = rng.permutation([i for i, order in enumerate(orders) for _ in order])
     left = [iter(order) for order in orders]

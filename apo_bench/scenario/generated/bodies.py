@@ -14,10 +14,10 @@ from apo_bench.scenario.parts.making import (
     bore,
     extrude,
     join,
-    polygon,
-    rectangle,
+    make_polygon,
+    make_rectangle,
+    make_shaft,
     revolve,
-    shaft,
 )
 
 _SIDES = ("ny", "px", "py", "nx")
@@ -46,7 +46,7 @@ def box(
     at: tuple[float, float, float], size: tuple[float, float, float], fit: Sequence[str] = (), **names: str
 ) -> Body:
     """A box about the middle of its bottom; its sides may be named, as `nx="wall"`."""
-    outline = rectangle(*size[:2], at[:2], names=[names.get(side, "") for side in _SIDES], fit=fit)
+    outline = make_rectangle(*size[:2], at[:2], names=[names.get(side, "") for side in _SIDES], fit=fit)
     return extrude(outline, at[2], at[2] + size[2])
 
 
@@ -58,13 +58,13 @@ def hole(pin: Pin, high: float) -> Bore:
 def block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:
     """A block about z on its bottom: faces `ny`, `px`, `py`, `nx`, `bottom`, `top`, and those of its pins and holes."""
     bores = [hole(each, height) for each in holes]
-    base = extrude(rectangle(width, depth, names=_SIDES), 0, height, bores=bores, bottom="bottom", top="top")
+    base = extrude(make_rectangle(width, depth, names=_SIDES), 0, height, bores=bores, bottom="bottom", top="top")
     return join(base, *(upright(pin, height) for pin in pins)) if pins else base
 
 
 def upright(pin: Pin, low: float) -> Body:
     """A pin that stands on a height."""
-    return shaft(pin.radius, low, low + pin.length, pin.name, chamfer_high=1.5).moved((pin.x, pin.y, 0.0))
+    return make_shaft(pin.radius, low, low + pin.length, pin.name, chamfer_high=1.5).moved((pin.x, pin.y, 0.0))
 
 
 def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
@@ -87,7 +87,7 @@ def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
     return revolve(steps, flats={0: "tip", deep: "shoulder", ledge: "ledge", end: "head"})
 
 
-def ring(outer: float, inner: float, height: float) -> Body:
+def make_ring(outer: float, inner: float, height: float) -> Body:
     """A disc with a bore: faces `bore`, `low`, `high`."""
     return revolve(
         [Frustum(0, height, outer)],
@@ -100,7 +100,7 @@ def slotted(length: float, depth: float, height: float, slot: float, floor: floa
     """A block with a slot along x, open above: faces `floor`, `slot_n`, `slot_p`."""
     out = depth / 2
     s = slot / 2
-    section = polygon(
+    section = make_polygon(
         (-out, 0), (out, 0), (out, height), (s, height), (s, floor), (-s, floor), (-s, height), (-out, height),
         names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
         fit=("slot_p", "slot_n"),
@@ -112,7 +112,7 @@ def saddle(length: float, depth: float, height: float, slot: float, roof: float)
     """A block with a slot along x, open below: faces `roof`, `slot_n`, `slot_p`, `top`."""
     out = depth / 2
     s = slot / 2
-    section = polygon(
+    section = make_polygon(
         (-out, 0), (-s, 0), (-s, roof), (s, roof), (s, 0), (out, 0), (out, height), (-out, height),
         names={1: "slot_n", 2: "roof", 3: "slot_p", 6: "top"},
         fit=("slot_p", "slot_n"),
@@ -124,13 +124,13 @@ def upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin)
     """A wall across x, about x = 0, between two heights, with a hole along x; `hole` has (height, y) as its place."""
     # lying along z it is turned up: what was -x becomes z, what was z becomes x
     bored = bore((-hole.x, hole.y), hole.radius, -thick / 2, thick / 2, hole.name, fit=True)
-    lying = extrude(rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
+    lying = extrude(make_rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
     return lying.moved(turn_deg=(0, 90, 0))
 
 
 def rod(radius: float, length: float, grip: float) -> Body:
     """A shaft along x, from 0 on, its axis a radius high, with a square head before it that keeps it from rolling."""
-    square = extrude(rectangle(2 * radius, 2 * radius), -grip, 0, bottom="end")
+    square = extrude(make_rectangle(2 * radius, 2 * radius), -grip, 0, bottom="end")
     # a groove behind the head, as a shaft as wide as the square would leave slivers of its face
     steps = [
         Frustum(0, 2, radius - _CHAMFER),

@@ -16,7 +16,7 @@ from apo_bench.scenario.generated.linked import (
     make_threaded,
 )
 from apo_bench.scenario.generated.stations import make_carried, make_corner, make_covered, make_peg, make_post
-from apo_bench.scenario.parts.making import Body, extrude, join, rectangle
+from apo_bench.scenario.parts.making import Body, extrude, join, make_rectangle
 
 _GAP = 10.0
 _EDGE = 6.0
@@ -77,7 +77,7 @@ def place_stations(title: str, stations: Sequence[Station], rng: np.random.Gener
     ys = [float(np.abs(piece.corners[:, 1]).max()) for body in bodies for piece in body.pieces]
     deep = max(60.0, 2e3 * max(ys, default=0.0) + 2 * _EDGE)
     bores = [bore for station in placed for bore in station.bores]
-    board = extrude(rectangle(length, deep), 0, TOP, bores=bores, bottom="bottom", top="top")
+    board = extrude(make_rectangle(length, deep), 0, TOP, bores=bores, bottom="bottom", top="top")
     parts: dict[str, Body] = {BOARD: join(board, *bodies) if bodies else board}
     fixed = {BOARD: (0.0, 0.0, 0.0)}
     for station in placed:

@@ -25,7 +25,7 @@ _BESIDE = 45.0
 _GRID = 6.0
 
 
-class Table(NamedTuple):
+class TableLayout(NamedTuple):
     """How the table is laid."""
 
     starts: Mapping[str, tuple[float, float, float]]
@@ -34,7 +34,7 @@ class Table(NamedTuple):
     yaw_deg: float
 
 
-def lay(made: GeneratedAssembly, rng: np.random.Generator) -> Table:
+def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
     """Draw where parts wait.
 
     Raises:
@@ -65,7 +65,7 @@ def lay(made: GeneratedAssembly, rng: np.random.Generator) -> Table:
         at = np.round(places[int(np.argmax(free))], 1)
         taken.append((at - size, at + size))
         starts[part] = (*(at - (low + high) / 2).round(3).tolist(), 0.0)
-    return Table(starts, (_CENTER, 0.0), spread, _YAW_DEG)
+    return TableLayout(starts, (_CENTER, 0.0), spread, _YAW_DEG)
 
 
 def _grid() -> Array:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembly import BOARD, Act, Station, between
+from apo_bench.scenario.generated.assembly import BOARD, DrawnOperation, Station, draw_length
 from apo_bench.scenario.generated.bodies import (
     PIN,
     TOP,
@@ -21,7 +21,7 @@ from apo_bench.scenario.generated.bodies import (
     upright_wall,
 )
 from apo_bench.scenario.generated.stations import LETTERS, LOW, WALL, head, hold, make_pile, make_plates
-from apo_bench.scenario.parts.making import Body, bore, extrude, join, polygon, rectangle
+from apo_bench.scenario.parts.making import Body, bore, extrude, join, make_polygon, make_rectangle
 
 _FOOT = 32.0
 """How far the foot of a bracket reaches from its wall."""
@@ -29,22 +29,22 @@ _FOOT = 32.0
 
 def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
     """Plates that lie anywhere on each other until two axles go through all of them."""
-    radius = between(rng, 5, 6)
-    apart = between(rng, 17, 20)
+    radius = draw_length(rng, 5, 6)
+    apart = draw_length(rng, 17, 20)
     width = 2 * apart + 2 * radius + 16
     pins = [Pin(x, 0, radius, letter) for x, letter in ((-apart, "a"), (apart, "b"))]
-    heights = [between(rng, 14, 16) for _ in range(size - 2)]
+    heights = [draw_length(rng, 14, 16) for _ in range(size - 2)]
     parts, acts = make_plates(rng, i, width, (34, 42), heights, pins)
     plates = list(parts)
     deep = TOP + sum(heights) - LOW
-    neck = between(rng, 24, 28)
-    body = axle(radius, deep, radius + between(rng, 4, 5), neck)
+    neck = draw_length(rng, 24, 28)
+    body = axle(radius, deep, radius + draw_length(rng, 4, 5), neck)
     for pin in pins:
         name = f"axle{i}{pin.name}"
         parts[name] = body
         through = [("side", f"{plate}.bore{pin.name}") for plate in plates]
         contacts = (("side", f"{BOARD}.bore{i}{pin.name}"), *through, ("shoulder", f"{plates[-1]}.top"))
-        acts.append(Act(name, (pin.x, 0, LOW), contacts, head(deep, neck)))
+        acts.append(DrawnOperation(name, (pin.x, 0, LOW), contacts, head(deep, neck)))
     bores = [bore((pin.x, 0), radius, 0, TOP, f"bore{i}{pin.name}", fit=True) for pin in pins]
     return Station(width, parts, tuple(acts), bores=tuple(bores))
 
@@ -52,20 +52,20 @@ def make_pinned(rng: np.random.Generator, i: str, size: int) -> Station:
 def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two or three towers that stand anywhere, plates over the pins of each two, blocks on these plates."""
     count = 3 if size >= 5 and (size > 6 or rng.random() < 0.7) else 2
-    pitch = between(rng, 66, 72)
-    width = between(rng, 40, 44)
-    height = between(rng, 36, 42)
-    depth = between(rng, 32, 36)
-    thick = between(rng, 14, 16)
+    pitch = draw_length(rng, 66, 72)
+    width = draw_length(rng, 40, 44)
+    height = draw_length(rng, 36, 42)
+    depth = draw_length(rng, 32, 36)
+    thick = draw_length(rng, 14, 16)
     aside = 11.0
     xs = [pitch * (k - (count - 1) / 2) for k in range(count)]
     parts = dict[str, Body]()
-    acts = list[Act]()
+    acts = list[DrawnOperation]()
     for k, x in enumerate(xs):
         name = f"tower{i}{LETTERS[k]}"
         sides = [(-aside, "left")] * (k > 0) + [(aside, "right")] * (k < count - 1)
         parts[name] = block(width, depth, height, [PIN._replace(x=at, name=side) for at, side in sides])
-        acts.append(Act(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), hold(height)))
+        acts.append(DrawnOperation(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), hold(height)))
     left = size - 2 * count + 1
     for k in range(count - 1):
         name = f"bridge{i}{LETTERS[k]}"
@@ -73,17 +73,17 @@ def make_bridged(rng: np.random.Generator, i: str, size: int) -> Station:
         ends = [(f"tower{i}{LETTERS[k]}", "right", -1.0), (f"tower{i}{LETTERS[k + 1]}", "left", 1.0)]
         far = pitch / 2 - aside
         holes = [PIN._replace(x=sign * far, name=side) for _, side, sign in ends]
-        parts[name] = block(2 * far + 18, between(rng, 28, 32), thick, [PIN] if caps else [], holes)
+        parts[name] = block(2 * far + 18, draw_length(rng, 28, 32), thick, [PIN] if caps else [], holes)
         on = [pair for tower, side, _ in ends for pair in (("bottom", f"{tower}.top"), (side, f"{tower}.{side}"))]
         middle = ((xs[k] + xs[k + 1]) / 2, 0.0, TOP + height)
-        acts.append(Act(name, middle, tuple(on), hold(thick)))
+        acts.append(DrawnOperation(name, middle, tuple(on), hold(thick)))
         more, piled = make_pile(rng, name, (*middle[:2], middle[2] + thick), caps)
         parts |= more
         acts += piled
     return Station(pitch * (count - 1) + width, parts, tuple(acts))
 
 
-class Way(NamedTuple):
+class SlidingPair(NamedTuple):
     """What keys go into, along x about the middle of a board, and a key."""
 
     rails: tuple[Body, ...]
@@ -105,58 +105,58 @@ def make_grooved(rng: np.random.Generator, i: str, size: int) -> Station:
     return _barred(rng, i, size, _groove)
 
 
-def _slot(rng: np.random.Generator, length: float, key_length: float) -> Way:
-    width = between(rng, 18, 24)
-    height = between(rng, 34, 40)
-    low = between(rng, 10, 12)
+def _slot(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
+    width = draw_length(rng, 18, 24)
+    height = draw_length(rng, 34, 40)
+    low = draw_length(rng, 10, 12)
     rails = (
         box((0, -(width + WALL) / 2, TOP), (length, WALL, low), fit=("n",), py="n"),
         box((0, (width + WALL) / 2, TOP), (length, WALL, low), fit=("p",), ny="p"),
     )
-    return Way(rails, block(key_length, width, height, [PIN]), height, (("ny", "n"), ("py", "p")))
+    return SlidingPair(rails, block(key_length, width, height, [PIN]), height, (("ny", "n"), ("py", "p")))
 
 
-def _groove(rng: np.random.Generator, length: float, key_length: float) -> Way:
+def _groove(rng: np.random.Generator, length: float, key_length: float) -> SlidingPair:
     """Rails that lean outwards by an angle, and a key with such flanks."""
     slope = float(np.tan(np.radians(rng.integers(45, 66))))
-    low = between(rng, 11, 13)
-    floor = between(rng, 7, 9)
-    height = between(rng, 38, 44)
+    low = draw_length(rng, 11, 13)
+    floor = draw_length(rng, 7, 9)
+    height = draw_length(rng, 38, 44)
     key_low = low - 1.0
     outer = floor + key_low / slope
     far = floor + low / slope
     corners = ((floor, TOP), (far + 3.0, TOP), (far + 3.0, TOP + low), (far, TOP + low))
     mirrored = [(-y, z) for y, z in corners[::-1]]
     rails = (
-        along_x(polygon(*corners, names={3: "p"}, fit=("p",)), length),
-        along_x(polygon(*mirrored, names={3: "n"}, fit=("n",)), length),
+        along_x(make_polygon(*corners, names={3: "p"}, fit=("p",)), length),
+        along_x(make_polygon(*mirrored, names={3: "n"}, fit=("n",)), length),
     )
-    section = polygon(
+    section = make_polygon(
         (-floor, 0), (floor, 0), (outer, key_low), (outer, height), (-outer, height), (-outer, key_low),
         names={0: "bottom", 1: "lean_p", 3: "top", 5: "lean_n"},
     )  # fmt: skip
     key = join(along_x(section, key_length), upright(PIN, height))
-    return Way(rails, key, height, (("lean_n", "n"), ("lean_p", "p")))
+    return SlidingPair(rails, key, height, (("lean_n", "n"), ("lean_p", "p")))
 
 
 def _barred(
-    rng: np.random.Generator, i: str, size: int, way_of: Callable[[np.random.Generator, float, float], Way]
+    rng: np.random.Generator, i: str, size: int, way_of: Callable[[np.random.Generator, float, float], SlidingPair]
 ) -> Station:
     """Two keys in one way, and a bar along it."""
-    apart = between(rng, 25, 28)
-    length = between(rng, 28, 34)
+    apart = draw_length(rng, 25, 28)
+    length = draw_length(rng, 28, 34)
     way = way_of(rng, 2 * apart + length + 6, length)
     ends = ((-apart, "a"), (apart, "b"))
     parts = {f"key{i}{end}": way.key for _, end in ends}
     on = (("bottom", f"{BOARD}.top"), *((own, f"{BOARD}.way{i}_{face}") for own, face in way.meets))
-    acts = [Act(f"key{i}{end}", (x, 0, TOP), on, hold(way.height)) for x, end in ends]
-    thick = between(rng, 14, 16)
+    acts = [DrawnOperation(f"key{i}{end}", (x, 0, TOP), on, hold(way.height)) for x, end in ends]
+    thick = draw_length(rng, 14, 16)
     z = TOP + way.height
     bar = f"bar{i}"
     holes = [PIN._replace(x=x, name=f"bore{end}") for x, end in ends]
-    parts[bar] = block(2 * apart + 20, between(rng, 24, 30), thick, [PIN] if size > 3 else [], holes)
+    parts[bar] = block(2 * apart + 20, draw_length(rng, 24, 30), thick, [PIN] if size > 3 else [], holes)
     pairs = [pair for _, e in ends for pair in (("bottom", f"key{i}{e}.top"), (f"bore{e}", f"key{i}{e}.pin"))]
-    acts.append(Act(bar, (0, 0, z), tuple(pairs), hold(thick)))
+    acts.append(DrawnOperation(bar, (0, 0, z), tuple(pairs), hold(thick)))
     more, piled = make_pile(rng, bar, (0, 0, z + thick), size - 3)
     rails = tuple(rail.prefixed(f"way{i}_") for rail in way.rails)
     return Station(2 * apart + length + 6, parts | more, (*acts, *piled), bodies=rails)
@@ -165,57 +165,62 @@ def _barred(
 def make_castled(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two or three blocks with slots that stand anywhere, a stick laid into all of them, saddles over the stick."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(3, size - 1) + 1))
-    pitch = between(rng, 70, 74)
-    length = between(rng, 34, 38)
-    slot = between(rng, 20, 24)
-    height = between(rng, 46, 52)
-    floor = between(rng, 20, 24)
-    over = between(rng, 20, 25)
-    body = slotted(length, between(rng, 40, 44), height, slot, floor)
+    pitch = draw_length(rng, 70, 74)
+    length = draw_length(rng, 34, 38)
+    slot = draw_length(rng, 20, 24)
+    height = draw_length(rng, 46, 52)
+    floor = draw_length(rng, 20, 24)
+    over = draw_length(rng, 20, 25)
+    body = slotted(length, draw_length(rng, 40, 44), height, slot, floor)
     xs = [pitch * (k - (count - 1) / 2) for k in range(count)]
     names = [f"castle{i}{LETTERS[k]}" for k in range(count)]
     parts = dict.fromkeys(names, body)
     grasp = (0.0, 0.0, 20.0)
-    acts = [Act(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), grasp) for name, x in zip(names, xs, strict=True)]
+    acts = [
+        DrawnOperation(name, (x, 0, TOP), (("bottom", f"{BOARD}.top"),), grasp)
+        for name, x in zip(names, xs, strict=True)
+    ]
     stick = f"stick{i}"
     high = height - floor + over
-    parts[stick] = block(pitch * (count - 1) + length + between(rng, 4, 16), slot, high)
+    parts[stick] = block(pitch * (count - 1) + length + draw_length(rng, 4, 16), slot, high)
     on = [
         pair
         for name in names
         for pair in (("bottom", f"{name}.floor"), ("ny", f"{name}.slot_n"), ("py", f"{name}.slot_p"))
     ]
-    acts.append(Act(stick, (0, 0, TOP + floor), tuple(on), (0, 0, high - 8)))
+    acts.append(DrawnOperation(stick, (0, 0, TOP + floor), tuple(on), (0, 0, high - 8)))
     roof = over - 2.0
     for k in range(size - count - 1):
         name = f"saddle{i}{LETTERS[k]}"
-        parts[name] = saddle(between(rng, 28, 34), slot + 20, roof + 16, slot, roof)
+        parts[name] = saddle(draw_length(rng, 28, 34), slot + 20, roof + 16, slot, roof)
         meets = (("roof", f"{stick}.top"), ("slot_n", f"{stick}.ny"), ("slot_p", f"{stick}.py"))
-        acts.append(Act(name, (xs[k], 0, TOP + floor + high - roof), meets, (0, 0, roof + 6), vary_mm=(("x", 3.0),)))
+        acts.append(
+            DrawnOperation(name, (xs[k], 0, TOP + floor + high - roof), meets, (0, 0, roof + 6), vary_mm=(("x", 3.0),))
+        )
     return Station(pitch * (count - 1) + length, parts, tuple(acts))
 
 
 def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
     """Brackets that stand anywhere, and a rod that is pushed, level, through the wall of the board and all of them."""
     count = size - 1
-    radius = between(rng, 7, 8)
-    high = between(rng, 38, 42)
-    depth = between(rng, 38, 42)
-    thick = between(rng, 12, 14)
-    pitch = between(rng, 60, 64)
+    radius = draw_length(rng, 7, 8)
+    high = draw_length(rng, 38, 42)
+    depth = draw_length(rng, 38, 42)
+    thick = draw_length(rng, 12, 14)
+    pitch = draw_length(rng, 60, 64)
     top = high + radius + 14
     first = -pitch * count / 2
     wall = join(
         box((0, 0, 0), (thick, depth, 10.0)), upright_wall(thick, depth, 10, top, Pin(high, 0, radius, f"bore{i}"))
     )
     bracket = join(
-        extrude(rectangle(_FOOT + thick, depth, (_FOOT / 2, 0)), 0, 10, bottom="bottom", top="tread"),
+        extrude(make_rectangle(_FOOT + thick, depth, (_FOOT / 2, 0)), 0, 10, bottom="bottom", top="tread"),
         upright_wall(thick, depth, 10, top, Pin(high, 0, radius, "bore")),
     )
     names = [f"bracket{i}{LETTERS[k]}" for k in range(count)]
     parts = dict.fromkeys(names, bracket)
     acts = [
-        Act(
+        DrawnOperation(
             name,
             (first + pitch * (k + 1), 0, TOP),
             (("bottom", f"{BOARD}.top"),),
@@ -228,5 +233,5 @@ def make_threaded(rng: np.random.Generator, i: str, size: int) -> Station:
     parts[stick] = rod(radius, pitch * count + thick + 20, 24)
     through = [("side", f"{BOARD}.bore{i}"), *(("side", f"{name}.bore") for name in names)]
     at = (first - thick / 2 - 8, 0.0, TOP + high - radius)
-    acts.append(Act(stick, at, tuple(through), (-12, 0, radius + 4), vary_mm=(("x", 2.0),)))
+    acts.append(DrawnOperation(stick, at, tuple(through), (-12, 0, radius + 4), vary_mm=(("x", 2.0),)))
     return Station(pitch * count + 2 * _FOOT + thick, parts, tuple(acts), bodies=(wall.moved((first, 0, TOP)),))

@@ -24,7 +24,7 @@ def is_generated(name: object) -> bool:
     return isinstance(name, str) and name.startswith(_PREFIX)
 
 
-def whole_name(name: str) -> str:
+def complete_name(name: str) -> str:
     """Return the name with its family: of `generated:SEED` that which the seed draws.
 
     Raises:
@@ -45,13 +45,13 @@ def whole_name(name: str) -> str:
     return f"{_PREFIX}{family}:{int(seed)}"
 
 
-def generated_file(name: str) -> Path:
+def make_generated_file(name: str) -> Path:
     """Return the scenario file of a generated assembly, in a folder that lasts as long as this process.
 
     Raises:
         InputError: No such family, or no such seed.
     """
-    return _write_once(whole_name(name))
+    return _write_once(complete_name(name))
 
 
 @lru_cache(maxsize=1024)
@@ -69,7 +69,7 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
 def write_generated(name: str, folder: Path) -> Path:
     """Write the files of a generated assembly, and return that of the scenario."""
     assembly, rng = generate_assembly(name)
-    return write(assembly, lay(assembly, rng), folder, "_".join(whole_name(name).split(":")[1:]))
+    return write(assembly, lay(assembly, rng), folder, "_".join(complete_name(name).split(":")[1:]))
 
 
 def generate_assembly(name: str) -> tuple[GeneratedAssembly, np.random.Generator]:
@@ -81,6 +81,6 @@ def generate_assembly(name: str) -> tuple[GeneratedAssembly, np.random.Generator
     Raises:
         InputError: No such family, or no such seed.
     """
-    _, family, seed = whole_name(name).split(":")
+    _, family, seed = complete_name(name).split(":")
     rng = np.random.default_rng([int(seed), _ASSEMBLY_STREAM, *family.encode()])
     return FAMILIES[family].draw(rng), rng

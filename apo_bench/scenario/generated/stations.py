@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from apo_bench.scenario.generated.assembly import BOARD, Act, Point, Station, between
-from apo_bench.scenario.generated.bodies import COLLAR, PIN, TOP, Pin, axle, block, box, ring, upright
+from apo_bench.scenario.generated.assembly import BOARD, DrawnOperation, Point, Station, draw_length
+from apo_bench.scenario.generated.bodies import COLLAR, PIN, TOP, Pin, axle, block, box, make_ring, upright
 from apo_bench.scenario.parts.making import Body, bore
 
 LETTERS = "abcdefghijkl"
@@ -31,17 +31,17 @@ def head(deep: float, neck: float) -> Point:
 
 def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
     """A block in a corner of two walls, others on top of it."""
-    width = between(rng, 32, 40)
-    depth = between(rng, 28, 34)
-    height = between(rng, 38, 44)
-    low = between(rng, 10, 14)
+    width = draw_length(rng, 32, 40)
+    depth = draw_length(rng, 28, 34)
+    height = draw_length(rng, 38, 44)
+    low = draw_length(rng, 10, 14)
     walls = (
         box((-(width + WALL) / 2, 0, TOP), (WALL, depth, low), px=f"wall{i}x"),
         box((0, (depth + WALL) / 2, TOP), (width, WALL, low), ny=f"wall{i}y"),
     )
     name = f"block{i}"
     contacts = (("bottom", f"{BOARD}.top"), ("nx", f"{BOARD}.wall{i}x"), ("py", f"{BOARD}.wall{i}y"))
-    acts = (Act(name, (0, 0, TOP), contacts, hold(height)),)
+    acts = (DrawnOperation(name, (0, 0, TOP), contacts, hold(height)),)
     is_loose = size > 1 and bool(rng.random() < _LOOSE)
     parts = {name: block(width, depth, height, [PIN] if size - is_loose > 1 else [])}
     more, piled = make_pile(rng, name, (0, 0, TOP + height), size - 1, is_loose)
@@ -50,7 +50,7 @@ def make_corner(rng: np.random.Generator, i: str, size: int) -> Station:
 
 def make_pile(
     rng: np.random.Generator, below: str, at: Point, count: int, loose: bool = False
-) -> tuple[dict[str, Body], list[Act]]:
+) -> tuple[dict[str, Body], list[DrawnOperation]]:
     """Blocks on each other, each on the pin of the one below it.
 
     Args:
@@ -58,18 +58,20 @@ def make_pile(
         loose: The last one has no pin below it, and lies anywhere.
     """
     parts = dict[str, Body]()
-    acts = list[Act]()
+    acts = list[DrawnOperation]()
     x, y, z = at
     stem = below
     for k in range(count):
         name = f"{stem}_{LETTERS[k]}"
-        height = between(rng, 28, 36)
+        height = draw_length(rng, 28, 36)
         is_loose = loose and (k == count - 1)
         pins = [PIN] if k < count - 1 - loose else []
         holes = [] if is_loose else [PIN._replace(name="bore")]
-        parts[name] = block(between(rng, 30, 36), between(rng, 28, 32), height, pins, holes)
+        parts[name] = block(draw_length(rng, 30, 36), draw_length(rng, 28, 32), height, pins, holes)
         on = (("bottom", f"{below}.top"), *(() if is_loose else (("bore", f"{below}.pin"),)))
-        acts.append(Act(name, (x, y, z), on, hold(height), vary_mm=(("x", 3.0), ("y", 2.0)) if is_loose else ()))
+        acts.append(
+            DrawnOperation(name, (x, y, z), on, hold(height), vary_mm=(("x", 3.0), ("y", 2.0)) if is_loose else ())
+        )
         below = name
         z += height
     return parts, acts
@@ -77,35 +79,42 @@ def make_pile(
 
 def make_peg(rng: np.random.Generator, i: str, size: int) -> Station:
     """An axle in a bore of the board, and a ring over it."""
-    radius = between(rng, 5, 7)
+    radius = draw_length(rng, 5, 7)
     parts, acts = make_ringed_axle(rng, i, radius)
     bores = (bore((0, 0), radius, 0, TOP, f"bore{i}", fit=True),)
     return Station(50.0, dict([*parts.items()][:size]), acts[:size], bores=bores)
 
 
-def make_ringed_axle(rng: np.random.Generator, i: str, radius: float) -> tuple[dict[str, Body], tuple[Act, ...]]:
+def make_ringed_axle(
+    rng: np.random.Generator, i: str, radius: float
+) -> tuple[dict[str, Body], tuple[DrawnOperation, ...]]:
     """An axle that its collar stops on the board, and a ring on its neck."""
-    collar = radius + between(rng, 4, 6)
+    collar = radius + draw_length(rng, 4, 6)
     deep = TOP - LOW
-    height = between(rng, 14, 18)
-    neck = height + between(rng, 24, 28)
+    height = draw_length(rng, 14, 18)
+    neck = height + draw_length(rng, 24, 28)
     name = f"axle{i}"
-    parts = {name: axle(radius, deep, collar, neck), f"ring{i}": ring(between(rng, collar + 4, 20), radius, height)}
+    parts = {
+        name: axle(radius, deep, collar, neck),
+        f"ring{i}": make_ring(draw_length(rng, collar + 4, 20), radius, height),
+    }
     contacts = (("side", f"{BOARD}.bore{i}"), ("shoulder", f"{BOARD}.top"))
     return parts, (
-        Act(name, (0, 0, LOW), contacts, head(deep, neck)),
-        Act(f"ring{i}", (0, 0, TOP + COLLAR), (("bore", f"{name}.neck"), ("low", f"{name}.ledge")), hold(height)),
+        DrawnOperation(name, (0, 0, LOW), contacts, head(deep, neck)),
+        DrawnOperation(
+            f"ring{i}", (0, 0, TOP + COLLAR), (("bore", f"{name}.neck"), ("low", f"{name}.ledge")), hold(height)
+        ),
     )
 
 
 def make_post(rng: np.random.Generator, i: str, size: int) -> Station:
     """Plates over one post of the board, or over two."""
     two = bool(rng.random() < 0.5)
-    radius = between(rng, 5, 7)
-    width = between(rng, 54, 60) if two else between(rng, 36, 46)
-    heights = [between(rng, 14, 16) for _ in range(size)]
-    high = sum(heights) + between(rng, 4, 8)
-    apart = between(rng, 15, 17)
+    radius = draw_length(rng, 5, 7)
+    width = draw_length(rng, 54, 60) if two else draw_length(rng, 36, 46)
+    heights = [draw_length(rng, 14, 16) for _ in range(size)]
+    high = sum(heights) + draw_length(rng, 4, 8)
+    apart = draw_length(rng, 15, 17)
     at = ((-apart, "a"), (apart, "b")) if two else ((0.0, "a"),)
     posts = [Pin(x, 0, radius, f"post{i}{letter}", high) for x, letter in at]
     parts, acts = make_plates(rng, i, width, (30, 40), heights, posts)
@@ -121,17 +130,17 @@ def make_plates(
     depth: tuple[float, float],
     heights: Sequence[float],
     through: Sequence[Pin],
-) -> tuple[dict[str, Body], list[Act]]:
+) -> tuple[dict[str, Body], list[DrawnOperation]]:
     """Plates flat on each other, with bores for what goes through them."""
     holes = [pin._replace(name=f"bore{pin.name[-1]}") for pin in through]
     parts = dict[str, Body]()
-    acts = list[Act]()
+    acts = list[DrawnOperation]()
     z = TOP
     below = f"{BOARD}.top"
     for k, height in enumerate(heights):
         name = f"plate{i}{LETTERS[k]}"
-        parts[name] = block(width, between(rng, *depth), height, holes=holes)
-        acts.append(Act(name, (0, 0, z), (("bottom", below),), hold(height)))
+        parts[name] = block(width, draw_length(rng, *depth), height, holes=holes)
+        acts.append(DrawnOperation(name, (0, 0, z), (("bottom", below),), hold(height)))
         below = f"{name}.top"
         z += height
     return parts, acts
@@ -141,38 +150,40 @@ def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
     """Two to four axles in bores of the board, a cover over all of them, rings on the cover."""
     count = int(rng.integers(max(2, -(-(size - 1) // 2)), min(4, size - 1) + 1))
     ringed = {int(k) for k in rng.permutation(count)[: size - 1 - count]}
-    radius = between(rng, 5, 6)
-    collar = radius + between(rng, 4, 6)
-    pitch = between(rng, 46, 50)
+    radius = draw_length(rng, 5, 6)
+    collar = radius + draw_length(rng, 4, 6)
+    pitch = draw_length(rng, 46, 50)
     xs = [pitch * (k - (count - 1) / 2) for k in range(count)]
-    thick = between(rng, 14, 16)
-    high = between(rng, 14, 16)
+    thick = draw_length(rng, 14, 16)
+    high = draw_length(rng, 14, 16)
     deep = TOP - LOW
-    neck = thick + high + between(rng, 24, 28)
+    neck = thick + high + draw_length(rng, 24, 28)
     body = axle(radius, deep, collar, neck)
     names = [f"axle{i}{LETTERS[k]}" for k in range(count)]
     parts: dict[str, Body] = dict.fromkeys(names, body)
     acts = [
-        Act(name, (x, 0, LOW), (("side", f"{BOARD}.bore_{name}"), ("shoulder", f"{BOARD}.top")), head(deep, neck))
+        DrawnOperation(
+            name, (x, 0, LOW), (("side", f"{BOARD}.bore_{name}"), ("shoulder", f"{BOARD}.top")), head(deep, neck)
+        )
         for name, x in zip(names, xs, strict=True)
     ]
     cover = f"cover{i}"
     holes = [Pin(x, 0, radius, f"bore_{name}") for name, x in zip(names, xs, strict=True)]
-    parts[cover] = block(pitch * (count - 1) + 40, between(rng, 32, 40), thick, holes=holes)
+    parts[cover] = block(pitch * (count - 1) + 40, draw_length(rng, 32, 40), thick, holes=holes)
     on = [pair for name in names for pair in (("bottom", f"{name}.ledge"), (f"bore_{name}", f"{name}.neck"))]
-    acts.append(Act(cover, (0, 0, TOP + COLLAR), tuple(on), hold(thick)))
-    disc = ring(between(rng, radius + 8, 20), radius, high)
+    acts.append(DrawnOperation(cover, (0, 0, TOP + COLLAR), tuple(on), hold(thick)))
+    disc = make_ring(draw_length(rng, radius + 8, 20), radius, high)
     for k in sorted(ringed):
         meets = (("bore", f"{names[k]}.neck"), ("low", f"{cover}.top"))
         parts[f"ring{i}{LETTERS[k]}"] = disc
-        acts.append(Act(f"ring{i}{LETTERS[k]}", (xs[k], 0, TOP + COLLAR + thick), meets, hold(high)))
+        acts.append(DrawnOperation(f"ring{i}{LETTERS[k]}", (xs[k], 0, TOP + COLLAR + thick), meets, hold(high)))
     bores = tuple(bore((x, 0), radius, 0, TOP, f"bore_{name}", fit=True) for name, x in zip(names, xs, strict=True))
     return Station(pitch * (count - 1) + 46, parts, tuple(acts), bores=bores)
 
 
 def make_carried(rng: np.random.Generator, i: str, size: int) -> Station:
     """An axle that gets its ring in a stand beside the board, and then carries it to its bore; three parts."""
-    radius = between(rng, 5, 7)
+    radius = draw_length(rng, 5, 7)
     parts, (first, second) = make_ringed_axle(rng, i, radius)
     stand = f"stand{i}"
     aside = 80.0

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.io import toml_text, write_file
-from apo_bench.scenario.generated.assembly import Act, GeneratedAssembly
-from apo_bench.scenario.generated.laying import Table
+from apo_bench.io import format_toml, write_file
+from apo_bench.scenario.generated.assembly import DrawnOperation, GeneratedAssembly
+from apo_bench.scenario.generated.laying import TableLayout
 from apo_bench.scenario.parts.making import Body, write_part
 
 _DENSITY = 700.0
@@ -27,7 +27,7 @@ _COLORS = (
 )
 
 
-def write(made: GeneratedAssembly, table: Table, folder: Path, name: str) -> Path:
+def write(made: GeneratedAssembly, table: TableLayout, folder: Path, name: str) -> Path:
     """Write the files of an assembly; returns that of the scenario."""
     files = _stems(made.parts)
     for part, stem in files.items():
@@ -36,7 +36,7 @@ def write(made: GeneratedAssembly, table: Table, folder: Path, name: str) -> Pat
                 part, made.parts[part], folder, density=_DENSITY, friction=_FRICTION, source=_SOURCE, licence=_LICENCE
             )
     path = folder / f"{name}.toml"
-    write_file(path, toml_text(_document(made, table, files)))
+    write_file(path, format_toml(_document(made, table, files)))
     return path
 
 
@@ -46,7 +46,7 @@ def _stems(parts: Mapping[str, Body]) -> Mapping[str, str]:
     return {name: first.setdefault(id(body), name) for name, body in parts.items()}
 
 
-def _document(made: GeneratedAssembly, table: Table, files: Mapping[str, str]) -> dict[str, Any]:
+def _document(made: GeneratedAssembly, table: TableLayout, files: Mapping[str, str]) -> dict[str, Any]:
     parts: dict[str, Any] = {"table": {"file": "table", "fixed": True}}
     for k, part in enumerate(made.parts):
         is_fixed = part in made.fixed
@@ -73,7 +73,7 @@ def _document(made: GeneratedAssembly, table: Table, files: Mapping[str, str]) -
     }
 
 
-def _operation(act: Act) -> dict[str, Any]:
+def _operation(act: DrawnOperation) -> dict[str, Any]:
     return {
         "move": act.part,
         "carries": act.carries,

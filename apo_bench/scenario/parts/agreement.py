@@ -15,12 +15,12 @@ from apo_bench.geometry import (
     Piece,
     RoundFace,
     Solid,
-    depth_inside,
-    flat_area,
-    passage,
-    physical_pieces,
-    plane_across,
-    rings_of,
+    find_plane_across,
+    list_rings,
+    make_flat_area,
+    measure_depth_inside,
+    measure_passage,
+    shrink_pieces,
 )
 from apo_bench.scenario.parts.stated import twice_area
 
@@ -71,9 +71,9 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
     import shapely
 
     n = face.normal
-    to_plane = plane_across(face.normal)
+    to_plane = find_plane_across(face.normal)
     near = _near(pieces, face.outline, _ABOVE_M)
-    stated = flat_area(face.outline, face.holes, to_plane)
+    stated = make_flat_area(face.outline, face.holes, to_plane)
     below = _below(face, near, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
@@ -83,7 +83,7 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
     commons = [common for area in below if (common := stated.intersection(area)).area >= _BESIDE_M**2]
     within = [[at.x, at.y] for at in (common.representative_point() for common in commons)]
     points = np.array(within).reshape(-1, 2) @ to_plane.T + (n @ face.outline[0] + _ABOVE_M) * n
-    depths = np.array([depth_inside(piece, points) for piece in near])
+    depths = np.array([measure_depth_inside(piece, points) for piece in near])
     for k in np.flatnonzero((depths > _ROUNDED_M).any(axis=0)):
         x, y, z = 1e3 * points[k]
         _fail(place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
@@ -104,8 +104,8 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     """What of a flat face lies on sides of pieces, and its share; None if that is not a single area."""
     import shapely
 
-    to_plane = plane_across(face.normal)
-    stated = shapely.make_valid(flat_area(face.outline, face.holes, to_plane))
+    to_plane = find_plane_across(face.normal)
+    stated = shapely.make_valid(make_flat_area(face.outline, face.holes, to_plane))
     lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
@@ -113,7 +113,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     if lying.geom_type != "Polygon" or lying.is_empty:
         return None
     off = (face.normal @ face.outline[0]) * face.normal
-    rings = [ring @ to_plane.T + off for ring in rings_of(lying)]
+    rings = [ring @ to_plane.T + off for ring in list_rings(lying)]
     oriented = [
         ring if (twice_area(ring) @ face.normal > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)
     ]
@@ -173,7 +173,7 @@ def check_receding(solid: Solid, path: Path) -> None:
     for wall in walls:
         wider = replace(wall, radii=(wall.radius + _TRIED_M, wall.radius + _TRIED_M))
         try:
-            _check_round(wider, physical_pieces(solid, _TRIED_M), "")
+            _check_round(wider, shrink_pieces(solid, _TRIED_M), "")
         except InputError as error:
             raise InputError(
                 f"{path}, faces, {wall.name}: the wall is fit, and pieces that touch it in a corner only keep it from "
@@ -191,7 +191,7 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
 
 def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
     """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
-    enter, leave = np.array([passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
+    enter, leave = np.array([measure_passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
     behind = leave <= 0.0
     return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import Piece, Solid, separating_axes, shadow, union_mesh
+from apo_bench.geometry import Piece, Solid, build_union_mesh, find_separating_axes, project_on_axes
 from apo_bench.scenario.parts.agreement import check_faces, check_receding
 from apo_bench.scenario.parts.part_file import PartFile
 
@@ -22,7 +22,7 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
         rounded: By how much round walls that are cut into flat ones may change the volume, [m^3].
     """
     assert solid.inertia is not None
-    mesh = union_mesh(solid.pieces)
+    mesh = build_union_mesh(solid.pieces)
     room = _SHARE * solid.volume + rounded
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
     require(
@@ -55,9 +55,9 @@ def touching_groups(pieces: Sequence[Piece]) -> list[set[int]]:
 
 def _gap(a: Piece, b: Piece) -> float:
     """How far two pieces are apart along the direction in which it is most, [m]; negative if they overlap."""
-    axes = separating_axes(a, np.eye(3), b, np.eye(3))
-    at, reach = shadow(a, np.eye(3), axes)
-    on, room = shadow(b, np.eye(3), axes)
+    axes = find_separating_axes(a, np.eye(3), b, np.eye(3))
+    at, reach = project_on_axes(a, np.eye(3), axes)
+    on, room = project_on_axes(b, np.eye(3), axes)
     return float((np.abs(at - on) - reach - room).max())
 
 

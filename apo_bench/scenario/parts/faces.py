@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Box, polygons_of, rings_of, straighten
+from apo_bench.geometry import Array, Box, list_polygons, list_rings, straighten
 
 _SAME_PLANE_M = 1e-9
 """Sides of boxes this near to each other lie in one plane."""
@@ -19,7 +19,7 @@ SIDES = ("px", "nx", "py", "ny", "pz", "nz")
 """Outward direction of a face, in the order of faces in a solid; also the stem of automatic names."""
 
 
-class Surface(NamedTuple):
+class UnnamedFace(NamedTuple):
     """One face without a name yet."""
 
     side: int
@@ -43,7 +43,7 @@ class Surface(NamedTuple):
 
     def rings(self) -> tuple[Array, ...]:
         """Outline, counter-clockwise seen from outside, then holes, clockwise; each (k, 3)."""
-        return tuple(map(self._lifted, rings_of(self.shape, self.sign)))
+        return tuple(map(self._lifted, list_rings(self.shape, self.sign)))
 
     def _lifted(self, ring: Array) -> Array:
         flat = straighten(ring)
@@ -57,7 +57,7 @@ class Surface(NamedTuple):
 class Union(NamedTuple):
     """The solid that boxes make together."""
 
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[UnnamedFace, ...]
     """In the order of `SIDES`, then by height, then by lowest corner."""
     centroid: Array
     """(3,), [m]."""
@@ -112,7 +112,7 @@ def _runs(bare: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
     return *np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
 
 
-def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surface]:
+def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[UnnamedFace]:
     """Every face: squares between full and empty cells, gathered by plane, joined where they share an edge."""
     import shapely
 
@@ -126,5 +126,5 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
             beyond = k + 1 if forward else k - 1
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
             row, begin, end = _runs(bare)
-            for piece in polygons_of(shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))):
-                yield Surface(side, float(grid[axis][k + forward]), piece)
+            for piece in list_polygons(shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))):
+                yield UnnamedFace(side, float(grid[axis][k + forward]), piece)

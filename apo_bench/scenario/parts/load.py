@@ -8,20 +8,20 @@ from apo_bench.geometry import Box, Face, Solid
 from apo_bench.resources import folder
 from apo_bench.scenario.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
 from apo_bench.scenario.parts.checking import check_part
-from apo_bench.scenario.parts.faces import SIDES, Surface, unite
-from apo_bench.scenario.parts.part_file import Mark, PartFile, read_part
+from apo_bench.scenario.parts.faces import SIDES, UnnamedFace, unite
+from apo_bench.scenario.parts.part_file import NamedSite, PartFile, read_part
 from apo_bench.scenario.parts.stated import StatedPart
 
 _ON_FACE_M = 1e-6
 """A site lies on a face if it is this near to its plane and this far from its edges."""
 
 
-def part_names() -> tuple[str, ...]:
+def list_part_names() -> tuple[str, ...]:
     """The short names of the parts that come with the package."""
     return tuple(sorted(path.stem for path in (folder("assets") / "parts").glob("*.xml")))
 
 
-def part_path(given: str | Path) -> Path:
+def find_part_path(given: str | Path) -> Path:
     """The file a short name or a path stands for.
 
     Raises:
@@ -29,7 +29,7 @@ def part_path(given: str | Path) -> Path:
     """
     if isinstance(given, Path) or given.endswith(".xml") or "/" in given or "\\" in given:
         return Path(given)
-    require_known("part", given, part_names(), rest=" Or give the path of an MJCF file, ending in .xml.")
+    require_known("part", given, list_part_names(), rest=" Or give the path of an MJCF file, ending in .xml.")
     return folder("assets") / "parts" / f"{given}.xml"
 
 
@@ -48,7 +48,7 @@ def load_part(given: str | Path, checked: bool = True) -> Solid:
     Raises:
         InputError: The file breaks a rule; the message names file, element and remedy.
     """
-    file = read_part(part_path(given))
+    file = read_part(find_part_path(given))
     solid = _stated(file, file.stated) if file.stated else _united(file)
     mass = file.density * solid.volume
     require(
@@ -85,7 +85,7 @@ def _united(file: PartFile) -> Solid:
         len(union.surfaces) <= MOST_FACES,
         f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.",
     )
-    marks = dict[int, Mark]()
+    marks = dict[int, NamedSite]()
     for each in file.marks:
         k = _under(file, each, union.surfaces)
         require(
@@ -104,7 +104,7 @@ def _united(file: PartFile) -> Solid:
     return Solid(file.path.stem, {face.name: face for face in faces}, boxes, union.centroid, union.volume)
 
 
-def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
+def _under(file: PartFile, mark: NamedSite, surfaces: tuple[UnnamedFace, ...]) -> int:
     from shapely import Point
 
     where = ", ".join(f"{1e3 * x:g}" for x in mark.point)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
+from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, make_cylinder_hull
 from apo_bench.scenario.parts.allowed import (
     DENSITY,
     LARGEST_M,
@@ -32,7 +32,7 @@ _AUTOMATIC = "auto_"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Mark:
+class NamedSite:
     """A site: the face on which it lies gets its name."""
 
     name: str
@@ -49,7 +49,7 @@ class PartFile:
     path: Path
     pieces: tuple[Piece, ...]
     """Named and ordered as the geoms."""
-    marks: tuple[Mark, ...]
+    marks: tuple[NamedSite, ...]
     """Of boxes alone."""
     stated: StatedPart | None
     """What stands beside it; None of boxes alone."""
@@ -112,7 +112,7 @@ def _of_boxes(path: Path, model: "PartModel", pieces: Sequence[Piece]) -> PartFi
     )
     for site in model.sites:
         require(not site.name.startswith(_AUTOMATIC), f"{path}: site '{site.name}': {_AUTOMATIC} is kept for others.")
-    marks = tuple(Mark(site.name, site.pos, site.default == _FIT_CLASS) for site in model.sites)
+    marks = tuple(NamedSite(site.name, site.pos, site.default == _FIT_CLASS) for site in model.sites)
     return PartFile(path, tuple(pieces), marks, None, min(densities), model)
 
 
@@ -133,4 +133,4 @@ def _piece(path: Path, geom: "PartGeom") -> Piece:
     require(size[0] <= WIDEST_M, f"{place} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.")
     length = float(np.linalg.norm(geom.axis))
     require(length >= _SHORTEST_AXIS, f"{place} has a zaxis= of no length; give a direction.")
-    return cylinder_hull(geom.name, Cylinder(geom.pos, geom.axis / length, float(size[0]), float(size[1])))
+    return make_cylinder_hull(geom.name, Cylinder(geom.pos, geom.axis / length, float(size[0]), float(size[1])))

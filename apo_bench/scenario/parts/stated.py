@@ -9,8 +9,8 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import require
-from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
-from apo_bench.io import Finite, Positive, Table, Text, Triple, convert_typed, read_typed
+from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, find_plane_across, make_flat_area
+from apo_bench.io import FileTable, Finite, Positive, Text, Triple, convert_typed, read_typed
 from apo_bench.scenario.parts.allowed import DENSITY, LARGEST_PART_BYTES, MOST_FACES, is_name
 
 PART_SCHEMA = "apo-bench/part/1"
@@ -31,7 +31,7 @@ _Friction = Annotated[float, Meta(ge=0.0, le=10.0)]
 _Ring = Annotated[list[_Point], Meta(min_length=3)]
 
 
-class PlaneTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="plane"):
+class PlaneTable(FileTable, frozen=True, kw_only=True, tag_field="kind", tag="plane"):
     """A flat face."""
 
     outline_mm: _Ring
@@ -39,7 +39,7 @@ class PlaneTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="plane"
     fit: bool = False
 
 
-class RimTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="rim"):
+class RimTable(FileTable, frozen=True, kw_only=True, tag_field="kind", tag="rim"):
     """The circle at the end of a hole or a shaft."""
 
     at_mm: _Point
@@ -48,7 +48,7 @@ class RimTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="rim"):
     radius_mm: _Radius
 
 
-class WallTable(Table, frozen=True, kw_only=True):
+class WallTable(FileTable, frozen=True, kw_only=True):
     """A round wall."""
 
     at_mm: _Point
@@ -75,7 +75,7 @@ class ConeTable(WallTable, frozen=True, kw_only=True, tag_field="kind", tag="con
 FaceTable = PlaneTable | CylinderTable | ConeTable | RimTable
 
 
-class MatterTable(Table, frozen=True, kw_only=True):
+class MatterTable(FileTable, frozen=True, kw_only=True):
     """The whole file."""
 
     schema: Literal["apo-bench/part/1"]
@@ -145,7 +145,7 @@ def _plane(name: str, table: PlaneTable, place: str) -> Face:
     n = across / np.linalg.norm(across)
     off = np.abs((np.concatenate([outline, *holes]) - outline[0]) @ n).max()
     require(off <= _FLAT_MM, f"{place}: corners within {_FLAT_MM:g} mm of one plane are needed, one is {off:.3g} off.")
-    valid = flat_area(outline, holes, plane_across(n)).is_valid
+    valid = make_flat_area(outline, holes, find_plane_across(n)).is_valid
     require(valid, f"{place}: an outline and holes inside it that do not cross are needed.")
     clockwise = all(twice_area(hole) @ n < 0.0 for hole in holes)
     require(clockwise, f"{place}, holes_mm: corners clockwise as seen from outside are needed.")

@@ -13,14 +13,14 @@ from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, STRETCH_M
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.execution import key_angles, moves
+from apo_bench.simulation.execution import plan_moves, solve_key_angles
 from apo_bench.simulation.robot import (
     ExecutionAborted,
     Robot,
+    measure_turn,
+    plan_steady_trajectory,
     smooth_trajectory,
-    steady_trajectory,
     translate,
-    turn_from,
 )
 from apo_bench.simulation.scene import Scene, build_scene
 
@@ -134,7 +134,7 @@ def missing_data(arm: Arm) -> list[str]:
 
 def _reach(kinematics: Kinematics, arm: Arm) -> Array:
     rows = []
-    rest = turn_from(tip_down(np.zeros(3)), kinematics.forward(arm.home))
+    rest = measure_turn(tip_down(np.zeros(3)), kinematics.forward(arm.home))
     for x, y in _GRID:
         q = np.array(arm.home)
         reached = 0
@@ -157,7 +157,7 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
                 line = (
                     smooth_trajectory(robot.T, end, speed)
                     if speed == SPEEDS[-1]
-                    else steady_trajectory(robot.T, end, speed)
+                    else plan_steady_trajectory(robot.T, end, speed)
                 )
                 errors.append(error_on(line, trace(robot, line), speed))
                 robot.wait(STAND_S)
@@ -188,8 +188,8 @@ def _force(arm: Arm, scene: Scene) -> float:
 
 def _margins(scene: Scene, plan: Plan) -> Array:
     least = np.full(len(scene.arm.joints), np.inf)
-    for move in moves(plan, scene):
-        angles = key_angles(move.transfer, scene)
+    for move in plan_moves(plan, scene):
+        angles = solve_key_angles(move.transfer, scene)
         if angles.code:
             return np.full(len(least), np.nan)
         least = np.minimum(least, np.min(list(map(scene.kinematics.limit_margins, angles.reached)), axis=0))

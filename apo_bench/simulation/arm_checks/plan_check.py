@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.assembly import Plan, Poses
-from apo_bench.geometry import Array, Solid, intrusion_depths, pose
+from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
 from apo_bench.planning.prediction.measures import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
@@ -17,12 +17,12 @@ from apo_bench.simulation.execution import (
     Grip,
     Move,
     Transfer,
-    after_transfer,
+    compute_transferred_poses,
     holds_firmly,
-    key_angles,
-    moves,
+    plan_moves,
+    solve_key_angles,
 )
-from apo_bench.simulation.robot import gripper_boxes
+from apo_bench.simulation.robot import list_gripper_boxes
 from apo_bench.simulation.scene import Scene
 
 _AT_LIMIT_RAD = np.radians(0.5)
@@ -37,13 +37,13 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     without an arm were tuned with that one.
 
     Args:
-        spiral: As in `moves`.
+        spiral: As in `plan_moves`.
     """
     predicted = list[ArmMove]()
     estimated = plan.start
-    for move in moves(plan, scene, spiral):
+    for move in plan_moves(plan, scene, spiral):
         operation = plan.assembly.operations[move.step.operation]
-        after = after_transfer(operation, move.transfer.T_world_goal, estimated)
+        after = compute_transferred_poses(operation, move.transfer.T_world_goal, estimated)
         held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]
         predicted.append(_arm_move(scene, move, held, estimated, after))
         estimated = after
@@ -60,7 +60,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], est
     """
     step = move.step
     t = move.transfer
-    code, path, ended = key_angles(t, scene)
+    code, path, ended = solve_key_angles(t, scene)
     if code:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
     if scene.arm.hand is None:
@@ -96,10 +96,10 @@ def struck_by(scene: Scene, t: Transfer, estimated: Poses, after: Poses) -> tupl
 def _deepest_strike(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
     go; zero and nothing where they have room."""
-    boxes = gripper_boxes(scene.kinematics, min(grip.half_width + beyond, scene.arm.opening_m))
+    boxes = list_gripper_boxes(scene.kinematics, min(grip.half_width + beyond, scene.arm.opening_m))
     T = poses[part] @ grip.T_part_tip
     depths = [
-        (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other], 0.0)[0]), other)
+        (float(measure_intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other], 0.0)[0]), other)
         for other, pieces in scene.pieces.items()
         if other != part
     ]

@@ -5,13 +5,13 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, remembered
+from apo_bench.geometry import Array, remember
 from apo_bench.simulation.robot import (
     ExecutionAborted,
     Robot,
     Trajectory,
+    plan_steady_trajectory,
     smooth_trajectory,
-    steady_trajectory,
     translate,
 )
 from apo_bench.simulation.robot.reach import along, limit_speed
@@ -46,7 +46,7 @@ class TipError:
     """How much of the turn the way ahead of the tip turns by; the rest is about that."""
 
 
-@remembered
+@remember
 def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     """The error of the tip of an empty hand in free air at a speed [m/s]; None where it has no way there.
 
@@ -57,7 +57,7 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
         with robot.watch_stability():
             rise(robot, SPEEDS[-1])
             length = STRETCH_M if speed > SPEEDS[0] else STRETCH_M / 10
-            line = steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), length), speed)
+            line = plan_steady_trajectory(robot.T, translate(robot.T, np.array([0.0, 1.0, 0.0]), length), speed)
             return error_on(line, trace(robot, line), speed)
     except ExecutionAborted:
         return None

@@ -8,15 +8,15 @@ from typing import final
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Array, copyable, freeze
-from apo_bench.io import named_files
+from apo_bench.geometry import Array, freeze, make_copyable
+from apo_bench.io import list_named_files
 
 _GRADED = 0.6
 """A gripper of which one step of the command makes this part of its opening knows open and closed only."""
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
     """What an arm can do; None: not stated."""
@@ -32,7 +32,7 @@ class ArmLimits:
 
 
 @final
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Hand:
     """Measured from closed to open; openings are of each finger, half the distance between the pads, [m]."""
@@ -91,53 +91,53 @@ class Hand:
 
 @final
 @check_arguments
-@copyable
+@make_copyable
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """An arm with a gripper of two sides, ready to be put into a scene.
+    """A robot arm with a gripper of two sides, for `build_scene`.
 
-    `read_arm(FILE.toml)` makes one of the description of any arm: it finds joints, drives and pads, and measures the
-    gripper, unless its file states that. An MJCF file that is as the fields state can be used directly,
-    without `model` and `hand`. The site `tip` lies between the fingertips: z points ahead, x along the closing
-    direction.
+    `read_arm` makes one from a description of any arm: it finds joints, actuators and pads, and measures the gripper
+    unless the file states its dimensions. An MJCF file with the names below can be used directly, without `model` and
+    `hand`. The site `tip` lies between the fingertips: z points ahead, x along the closing direction.
     """
 
     mjcf: Path
-    """The MJCF file of the whole, or the file by which the arm was described."""
+    """The MJCF file of arm and gripper, or the file that describes them."""
     base: tuple[float, float, float]
-    """Where its base stands, world, [m]."""
+    """Position of the base, world frame, [m]."""
     joints: tuple[str, ...]
-    """Each has a position actuator of the same name."""
+    """Names of the joints; each has a position actuator of the same name."""
     tip: str
+    """Name of the site between the fingertips."""
     fingers: tuple[str, ...]
-    """Slide joints, zero when closed, opening [m] per finger; those of the hand, where that was measured."""
+    """Slide joints of the fingers, zero when closed, opening [m] per finger; or the joints of a measured gripper."""
     grip: str
-    """The position actuator of the fingers; empty where the hand was measured."""
+    """The position actuator of the fingers; empty for a measured gripper."""
     mount: str
     """The body that a part is welded to by the ideal grasp."""
     home: Array
     """Joint angles near which inverse kinematics starts, [rad]."""
     opening_m: float
-    """Widest opening per finger."""
+    """Widest opening per finger, [m]."""
     squeeze_m: float = 0.03
-    """How far inside the part the fingers are commanded: beyond it the actuator's force limit rules."""
+    """Depth to which the fingers are commanded into the part, [m]; the force limit of the actuator stops them."""
     turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    """How its base is turned, quaternion (w, x, y, z), world."""
+    """Orientation of the base, quaternion (w, x, y, z), world frame."""
     model: str | None = None
-    """The whole as MJCF text, where the arm was described by a file; None: `mjcf` is that file."""
+    """The model as MJCF text if a file described the arm; None: `mjcf` is the model."""
     hand: Hand | None = None
-    """What the gripper does, where that was measured."""
+    """The measured gripper; None: `fingers` and `grip` state it."""
     limits: ArmLimits = ArmLimits()
-    """What it can do."""
+    """Payload, speeds and torques."""
     files: tuple[Path, ...] = ()
-    """All files that it was made of; none: `mjcf` and what that names."""
+    """All files of the arm. Default: `mjcf` and the files that it names."""
     control: str = "own position actuators"
-    """What moves the joints, and how much stronger than in the model the drive of the gripper is, if it is."""
+    """The actuators of the joints, and the factor on the gripper's drive, in words."""
 
     def __post_init__(self) -> None:
         freeze(self, home=(len(self.joints),))
-        object.__setattr__(self, "files", self.files or named_files(self.mjcf))
+        object.__setattr__(self, "files", self.files or list_named_files(self.mjcf))
 
     def finger_joints(self, opening: float) -> Array:
-        """Where the joints of `fingers` are at an opening of the empty hand, (k,)."""
+        """Return the positions of the joints `fingers` at an opening [m] of the empty gripper, (k,)."""
         return np.full(len(self.fingers), opening) if self.hand is None else self.hand.state(opening)

@@ -39,10 +39,13 @@ _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 @check_arguments
 def read_arm(path: str | Path) -> Arm:
-    """The arm of an arm file.
+    """Read an arm from a TOML file that describes any MJCF arm with a gripper of two sides.
+
+    Args:
+        path: The arm file; `docs/guide/arm.md` lists its keys.
 
     Raises:
-        InputError: Anything that is wrong in the file or in the models that it names.
+        InputError: A fault of the file or of the models that it names.
     """
     return read_described(read_description(Path(path)))
 

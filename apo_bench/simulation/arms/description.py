@@ -8,7 +8,7 @@ from msgspec import Meta, structs
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.io import Finite, Table, Text, read_typed
+from apo_bench.io import FileTable, Finite, Text, read_typed
 from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.gripper_file import gripper_path
 
@@ -20,7 +20,7 @@ Speed = Annotated[float, Meta(gt=0.0, le=3600.0)]
 Torque = Annotated[float, Meta(gt=0.0, le=1e5)]
 
 
-class GripperDescription(Table, frozen=True, kw_only=True):
+class GripperDescription(FileTable, frozen=True, kw_only=True):
     """The gripper and its drive: a gripper file as `hand`, or `slides`.
 
     Slides are a finger on each side that slides, both driven by one actuator; the model is used as it is.
@@ -53,7 +53,7 @@ class GripperDescription(Table, frozen=True, kw_only=True):
             raise ValueError("a gripper whose 'slides' are stated is part of the arm; leave 'hand' and 'mjcf' out.")
 
 
-class ArmTable(Table, frozen=True, kw_only=True):
+class ArmTable(FileTable, frozen=True, kw_only=True):
     """The keys of an arm file."""
 
     schema: Literal["apo-bench/arm/1"]

@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.io import Finite, NotNegative, Positive, Table, Text, read_typed
+from apo_bench.io import FileTable, Finite, NotNegative, Positive, Text, read_typed
 from apo_bench.resources import folder
 from apo_bench.scenario.values import AnyPose
 from apo_bench.simulation.arms.arm import Hand
@@ -17,7 +17,7 @@ Numbers = Annotated[tuple[Finite, ...], Meta(min_length=2, max_length=64)]
 Rows = Annotated[tuple[tuple[Finite, ...], ...], Meta(min_length=2, max_length=64)]
 
 
-class GripperTable(Table, frozen=True, kw_only=True):
+class GripperTable(FileTable, frozen=True, kw_only=True):
     """The keys of a gripper file; names are those in its MJCF, openings are of each finger."""
 
     schema: Literal["apo-bench/gripper/1"]

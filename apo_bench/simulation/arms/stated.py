@@ -8,16 +8,16 @@ import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, pose
-from apo_bench.io import named_files
+from apo_bench.io import list_named_files
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.description import ArmDescription
 
 
 def model_files(description: ArmDescription) -> tuple[Path, ...]:
     """All files that an arm is made of."""
-    named = [description.file, *named_files(description.model_file)]
+    named = [description.file, *list_named_files(description.model_file)]
     if description.gripper_file is not None:
-        named += named_files(description.gripper_file)
+        named += list_named_files(description.gripper_file)
     return tuple(dict.fromkeys([*named, *([] if description.hand_file is None else [description.hand_file])]))
 
 

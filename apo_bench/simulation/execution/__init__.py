@@ -1,17 +1,29 @@
 """The robot executes a plan."""
 
-from apo_bench.simulation.execution.carry_out import after_attach, before_attach, end_of_attach, pace
+from apo_bench.simulation.execution.carry_out import carry_to_attach, choose_pace, find_attach_end, finish_attach
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.execution import Execution
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M, check_hold, depart, release
-from apo_bench.simulation.execution.grasping import RestingPart, Stroke, first_clear, obstacles, tip_frame
-from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, key_angles, moves
+from apo_bench.simulation.execution.grasping import (
+    RestingPart,
+    Stroke,
+    find_clear_grasp,
+    list_obstacles,
+    make_tip_frame,
+)
+from apo_bench.simulation.execution.prepare import Move, holds_firmly, in_reach, plan_moves, solve_key_angles
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS, ProbingConfig
 from apo_bench.simulation.execution.replay_cache import ReplayCache, SavedState, restore_state, save_state
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
-from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer, arrival_line, hover
+from apo_bench.simulation.execution.transfer import (
+    Grip,
+    Transfer,
+    compute_transferred_poses,
+    find_hover_pose,
+    plan_arrival_line,
+)
 
 __all__ = (
     "DEFAULT_EXECUTION",
@@ -29,25 +41,25 @@ __all__ = (
     "SavedState",
     "Stroke",
     "Transfer",
-    "after_attach",
-    "after_transfer",
-    "arrival_line",
-    "before_attach",
+    "carry_to_attach",
     "check_hold",
+    "choose_pace",
+    "compute_transferred_poses",
     "depart",
-    "end_of_attach",
-    "first_clear",
+    "find_attach_end",
+    "find_clear_grasp",
+    "find_hover_pose",
+    "finish_attach",
     "holds_firmly",
-    "hover",
     "in_reach",
-    "key_angles",
-    "moves",
-    "obstacles",
-    "pace",
+    "list_obstacles",
+    "make_tip_frame",
+    "plan_arrival_line",
+    "plan_moves",
     "release",
     "replay",
     "restore_state",
     "save_state",
-    "tip_frame",
+    "solve_key_angles",
     "wait_for_rest",
 )

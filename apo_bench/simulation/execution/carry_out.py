@@ -20,11 +20,11 @@ from apo_bench.simulation.robot import (
     Guard,
     Robot,
     Trajectory,
-    paced_trajectory,
+    move_to_height,
+    plan_paced_trajectory,
+    plan_steady_trajectory,
     smooth_trajectory,
-    steady_trajectory,
     translate,
-    with_height,
 )
 from apo_bench.simulation.robot.paths import distance
 
@@ -80,7 +80,9 @@ def pick(robot: Robot, t: Transfer, again: bool = False) -> int:
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, 0.004), 0.02))
     _leave(robot, t)
     robot.steady(not t.drawn)
-    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
+    robot.follow(
+        smooth_trajectory(robot.T, move_to_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)])
+    )
     robot.steady(False)
     return in_use
 
@@ -94,13 +96,13 @@ def place(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
     Raises:
         ExecutionAborted: Something went wrong; stage and code name it.
     """
-    grip, second = before_attach(robot, t, i, lay)
+    grip, second = carry_to_attach(robot, t, i, lay)
     robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
     left, grip = _attach(robot, t, grip, second)
     _leave_there(robot, t, grip, left)
 
 
-def before_attach(
+def carry_to_attach(
     robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None
 ) -> tuple[Grip, Grip | None]:
     """Carry the part to where the guarded motion begins; returns the grip, and the next if it is to be changed.
@@ -121,8 +123,8 @@ def before_attach(
     return grip, t.grips[i + 1] if t.into.left is not None else None
 
 
-def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_found: Array) -> None:
-    """Do the rest of an operation after an agent has moved the part to `end_of_attach`.
+def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_found: Array) -> None:
+    """Do the rest of an operation after an agent has moved the part to `find_attach_end`.
 
     Args:
         T_found: What brings the poses that were meant to those that were found, (4, 4), world.
@@ -137,13 +139,15 @@ def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_f
         left = _to_goal(robot, t, grip, rise, T_found)
     lower = rise if t.into.level else 0.0
     guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.direction, t.place_n)
-    robot.follow(steady_trajectory(robot.T, translate(robot.T, guard.direction, lower + _OVERTRAVEL_M), _TOUCH), guard)
+    robot.follow(
+        plan_steady_trajectory(robot.T, translate(robot.T, guard.direction, lower + _OVERTRAVEL_M), _TOUCH), guard
+    )
     robot.stand()
     _slides(robot, t, left)
     _leave_there(robot, t, grip, left)
 
 
-def end_of_attach(t: Transfer, grip: Grip, second: Grip | None) -> Array:
+def find_attach_end(t: Transfer, grip: Grip, second: Grip | None) -> Array:
     """The tip pose at which the guarded motion ends, or the first of two with a change of the grip between, (4, 4)."""
     goal = first_contact_pose(t)
     if second is not None and t.into.left is not None:
@@ -162,8 +166,8 @@ class Pace(NamedTuple):
     """It ends so far before the goal, [m]; beyond it where contact is sought."""
 
 
-def pace(t: Transfer, second: Grip | None) -> Pace:
-    """The pace of the motion to `end_of_attach`: slow where an entrance or contact may be."""
+def choose_pace(t: Transfer, second: Grip | None) -> Pace:
+    """The pace of the motion to `find_attach_end`: slow where an entrance or contact may be."""
     bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
     if not t.into.level:
         return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
@@ -193,7 +197,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     if t.into.level:
         before = translate(before, UP, t.floats)
     robot.steady(True)
-    robot.go(with_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
+    robot.go(move_to_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
     robot.follow(smooth_trajectory(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
@@ -228,14 +232,14 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
     rise = t.floats
     T_search = None
     if t.into.left is not None and second is not None:
-        line = _into(robot, t, end_of_attach(t, grip, second), t.into.left)
+        line = _into(robot, t, find_attach_end(t, grip, second), t.into.left)
         left, T_search = press_in(robot, t, grip, line, Guard(t.into.direction, t.insert_n), _ARRIVED_M)
         if left > _ARRIVED_M:
             return left + t.into.left, grip
         grip, rise = _with_other_grip(robot, t, grip, second, T_search)
     left = _to_goal(robot, t, grip, rise, T_search)
     lower = translate(robot.T, UP, -rise - _OVERTRAVEL_M)
-    robot.follow(steady_trajectory(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
+    robot.follow(plan_steady_trajectory(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.stand()
     return left, grip
 
@@ -258,7 +262,7 @@ def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array
     left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
     if left == 0.0:
         beyond = after_search(T_search, translate(goal, t.into.direction, _OVERTRAVEL_M))
-        robot.follow(steady_trajectory(robot.T, beyond, _TOUCH), guard)
+        robot.follow(plan_steady_trajectory(robot.T, beyond, _TOUCH), guard)
     return left
 
 
@@ -266,18 +270,18 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     """From above, slowly where contact may come any moment, until the part stands."""
     down = Guard(t.into.direction, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
-    above = steady_trajectory(robot.T, translate(goal, t.into.direction, -t.slow), _PLACE)
+    above = plan_steady_trajectory(robot.T, translate(goal, t.into.direction, -t.slow), _PLACE)
     left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
         end = after_search(T_search, translate(goal, t.into.direction, _OVERTRAVEL_M))
-        press_in(robot, t, grip, steady_trajectory(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
+        press_in(robot, t, grip, plan_steady_trajectory(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
     robot.stand()
 
 
 def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
     """On to `left` [m] before the goal, slowly where an entrance may be."""
     at = [distance(robot.T, end) + left - entrance for entrance in t.entrances]
-    return paced_trajectory(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
+    return plan_paced_trajectory(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 
 def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
@@ -293,10 +297,10 @@ def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
     robot.stand()
     robot.follow(
-        steady_trajectory(robot.T, translate(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n)
+        plan_steady_trajectory(robot.T, translate(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n)
     )
     robot.follow(
-        steady_trajectory(robot.T, translate(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n)
+        plan_steady_trajectory(robot.T, translate(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n)
     )
     robot.stand()
 

@@ -14,23 +14,27 @@ from apo_bench.simulation.robot import RobotError
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class ExecutionConfig:
-    """How the robot executes a plan; by default a robot without errors that neither searches nor probes.
+    """How the robot executes a plan. Default: a robot without errors that neither searches nor probes.
 
     Raises:
         InputError: The fidelity is unknown.
+
+    Examples:
+        >>> import apo_bench
+        >>> apo_bench.ExecutionConfig(fidelity="near-contact", spiral=True).searches
+        True
     """
 
     fidelity: str = "full"
-    """`full`, or `near-contact`: the simulation skips stretches of a motion on which nothing is near. With a grasp by
-    friction, parts that rest untouched sleep in both."""
+    """`full`, or `near-contact`: only the part of each motion in which parts may touch is simulated."""
     spiral: bool = False
-    """Whether the robot searches for a hole along a spiral where force stops a motion into it."""
+    """Whether the robot searches along a spiral for a hole when contact stops the insertion."""
     time_limit_s: float = math.inf
-    """Simulated time after which no step begins; a schedule that surely takes longer does not begin."""
+    """Simulated time after which no step begins, [s]."""
     robot_error: RobotError | None = None
-    """The errors of the robot, which it does not know; None: it has none."""
+    """The calibration errors of the robot, unknown to it; None: no errors."""
     probing: ProbingConfig | None = None
-    """How the robot estimates its errors by touching what is fixed; None: it does not."""
+    """How the robot probes fixed surfaces to estimate its errors; None: it does not."""
 
     def __post_init__(self) -> None:
         check("fidelity", self.fidelity)

@@ -5,16 +5,16 @@ from collections.abc import Callable
 from typing import Any
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, poses_in_force
+from apo_bench.assembly import Outcome, Plan, Poses, ReachedState, ReplayResult, Snapshot, list_poses_in_force
 from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.simulation.execution.config import DEFAULT_EXECUTION, ExecutionConfig
 from apo_bench.simulation.execution.execution import Execution, failed_outcome, moves_with_error
-from apo_bench.simulation.execution.prepare import Move, key_angles
+from apo_bench.simulation.execution.prepare import Move, solve_key_angles
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.hooks import Hooks, as_hooks
 from apo_bench.simulation.robot import ExecutionAborted, Robot
-from apo_bench.simulation.scene import Scene, allow_sleep, snapshot
+from apo_bench.simulation.scene import Scene, allow_sleep, take_snapshot
 
 _SETTLE_S = 0.5
 """At the end, everything is left alone this long."""
@@ -31,16 +31,18 @@ def replay(
     parts_at: Poses | None = None,
     cache: ReplayCache | None = None,
 ) -> ReplayResult:
-    """Execute a plan by the robot of a scene.
+    """Execute a plan with the robot of a scene.
 
     Args:
+        plan: From `fit_plan`, `Correction.plan` or `Observation.plan`.
+        scene: From `build_scene`.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         config: How the robot executes it.
         parts_at: The true poses of the parts before the first operation, world frame, [m]; by default the plan's.
-        cache: What replays of this scene have in common; changes nothing but the time it takes.
+        cache: States that replays of this scene share; it changes only the computing time.
 
     Returns:
-        What the robot has reached, and how it ended.
+        The state that the robot reached, and how the replay ended; `judge` takes `reached`.
     """
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > config.time_limit_s:
@@ -62,7 +64,7 @@ def replay(
         outcome = refused or execution.run(todo, cache, keys)
         final = _settle(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
-        reached=Reached(after=tuple(execution.progress.after), final=final),
+        reached=ReachedState(after=tuple(execution.progress.after), final=final),
         outcome=outcome,
         peak_force_n=robot.forces.peak_n,
         sim_time_s=float(robot.data.time),
@@ -77,12 +79,12 @@ def replay(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in poses_in_force(plan):
+    for upto, goals in list_poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return failed_outcome(plan, "plan", "unstable_goal", k)
     for step, transfer in todo:
-        if code := key_angles(transfer, scene).code:
+        if code := solve_key_angles(transfer, scene).code:
             return failed_outcome(plan, "plan", code, step.operation)
     return None
 
@@ -95,4 +97,4 @@ def _settle(robot: Robot, plan: Plan) -> Snapshot | None:
     except ExecutionAborted as aborted:
         if aborted.code == "unstable_simulation":
             return None
-    return snapshot(robot.scene.work, robot.data, plan.start)
+    return take_snapshot(robot.scene.work, robot.data, plan.start)

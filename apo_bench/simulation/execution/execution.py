@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from apo_bench.assembly import Outcome, Plan, Step
-from apo_bench.records import sentence, touching_sentence
+from apo_bench.records import describe_outcome, describe_touch
 from apo_bench.simulation.execution.carry_out import pick, place
 from apo_bench.simulation.execution.config import ExecutionConfig
-from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.prepare import Move, plan_moves
 from apo_bench.simulation.execution.probing.lay_flat import lay_flat
 from apo_bench.simulation.execution.probing.state import ProbingState
 from apo_bench.simulation.execution.probing.touching import probe_fixed_parts
@@ -15,7 +15,7 @@ from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache
 from apo_bench.simulation.execution.resting import wait_for_rest
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot import ExecutionAborted, GraspSlipMonitor, Robot, RobotError
-from apo_bench.simulation.scene import Scene, snapshot
+from apo_bench.simulation.scene import Scene, take_snapshot
 
 _AT_FIRST_S = 0.05
 """The arm stands so long before the first operation."""
@@ -24,14 +24,14 @@ _AT_FIRST_S = 0.05
 def moves_with_error(plan: Plan, scene: Scene, config: ExecutionConfig, error: RobotError | None) -> tuple[Move, ...]:
     """The moves of a plan as a robot with an error executes them."""
     if error is None:
-        return moves(plan, scene, config.searches, config.actions)
-    planned = moves(error.plan(plan), scene, config.searches, config.actions)
+        return plan_moves(plan, scene, config.searches, config.actions)
+    planned = plan_moves(error.plan(plan), scene, config.searches, config.actions)
     return tuple(Move(step, transfer.with_tip_at(error.tool)) for step, transfer in planned)
 
 
 def failed_outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
     """The outcome of an operation that failed; by default about its main part."""
-    return Outcome(stage, code, k, sentence(code, part=part or plan.assembly.operations[k].main, operation=k))
+    return Outcome(stage, code, k, describe_outcome(code, part=part or plan.assembly.operations[k].main, operation=k))
 
 
 class Execution:
@@ -71,9 +71,7 @@ class Execution:
             except ExecutionAborted as aborted:
                 if aborted.stage == "touch":
                     why = f": {aborted.why}" if aborted.why else ""
-                    return Outcome(
-                        "touch", aborted.code, None, touching_sentence(aborted.code, part=aborted.part) + why
-                    )
+                    return Outcome("touch", aborted.code, None, describe_touch(aborted.code, part=aborted.part) + why)
                 return failed_outcome(self.plan, "pick", aborted.code, self.plan.schedule[0].operation, aborted.part)
         for i, (step, transfer) in list(enumerate(todo))[kept_states // 2 :]:
             if robot.data.time > self.config.time_limit_s:
@@ -88,18 +86,18 @@ class Execution:
                     place(robot, transfer, grip, self.laying(transfer, step.operation))
                     self._note_slip(step)
                     wait_for_rest(robot)
-                    reached = None if step.undo else snapshot(robot.scene.work, robot.data, self.plan.start)
+                    reached = None if step.undo else take_snapshot(robot.scene.work, robot.data, self.plan.start)
             except ExecutionAborted as aborted:
                 if aborted.code != "unstable_simulation":
                     self._note_slip(step)
                 if aborted.code == "force_stop" and not step.undo:
-                    self.progress.after[step.operation] = snapshot(robot.scene.work, robot.data, self.plan.start)
+                    self.progress.after[step.operation] = take_snapshot(robot.scene.work, robot.data, self.plan.start)
                 return failed_outcome(self.plan, aborted.stage, aborted.code, step.operation, aborted.part)
             self.progress.after[step.operation] = reached
             self.progress.timeline.append((step, float(robot.data.time)))
             cache.keep(keys[2 * i + 1], robot, 0, self.progress)
             robot.hooks.after_step(step)
-        return Outcome("done", "ok", None, sentence("ok"))
+        return Outcome("done", "ok", None, describe_outcome("ok"))
 
     def pick(self, transfer: Transfer, operation: int) -> int:
         """Pick a part, which may slip; returns which of the grips of the transfer is in use.

@@ -1,16 +1,16 @@
 """The fingers: take a part, let go of it, take it elsewhere, centre it."""
 
 from apo_bench.geometry import Array
-from apo_bench.simulation.execution.transfer import Grip, Transfer, hover, is_tilted
+from apo_bench.simulation.execution.transfer import Grip, Transfer, find_hover_pose, is_tilted
 from apo_bench.simulation.robot import (
     ExecutionAborted,
     Robot,
     follow_waypoints,
+    move_to_height,
     plan_waypoints,
     smooth_trajectory,
     translate,
     weld,
-    with_height,
 )
 
 _FREE = 2.0  # peak speed [m/s] of the empty hand in the air
@@ -25,14 +25,14 @@ the way to the middle."""
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
-    above = hover(at)
+    above = find_hover_pose(at)
     least = max(above[2, 3], t.over)
-    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
-    level = with_height(above, robot.T[2, 3])
+    robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
+    level = move_to_height(above, robot.T[2, 3])
     # A short arm does not reach as far out as here where it waits, or has passed over other parts.
     between = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
     is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, between, robot.q) is None
-    robot.go(with_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
+    robot.go(move_to_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     if is_tilted(at):
@@ -61,7 +61,7 @@ def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
     robot.follow(smooth_trajectory(robot.T, translate(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.forces.handle(None)
-    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
+    robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
 
 def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:

@@ -10,9 +10,18 @@ import numpy as np
 from shapely import MultiPoint
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depths, own_shape, plane_frame, pose
+from apo_bench.geometry import (
+    Array,
+    Face,
+    collect_corners,
+    flatten_face,
+    make_plane_frame,
+    measure_extent,
+    measure_intrusion_depths,
+    pose,
+)
 from apo_bench.planning.insertion.macros import UP
-from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
+from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles, upwards
 from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.robot import translate
 from apo_bench.simulation.scene import Scene
@@ -67,15 +76,21 @@ def find_flat_placement(assembly: Assembly, scene: Scene, t: Transfer, estimated
     flush = highest.T
     far = float(T[2, 3] - flush[2, 3])
     lifts = np.linspace(far, 0.0, max(2, round(far / _LIFT_STEP_M)))[:, None] * UP
-    others = obstacles(assembly.solids, estimated, (t.part, *assembly.fixed))
-    fixed = obstacles(assembly.solids, estimated, (t.part, *(set(assembly.solids) - assembly.fixed)))
+    others = list_obstacles(assembly.solids, estimated, (t.part, *assembly.fixed))
+    fixed = list_obstacles(assembly.solids, estimated, (t.part, *(set(assembly.solids) - assembly.fixed)))
     R = flush[:3, :3]
     pieces = scene.pieces[t.part]
     for each in others:
-        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _LIFT_ROOM_M).max() > -_LIFT_ROOM_M:
+        if (
+            measure_intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _LIFT_ROOM_M).max()
+            > -_LIFT_ROOM_M
+        ):
             return None
     for each in fixed:  # down to the floor itself, which it touches
-        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max() > 0.0:
+        if (
+            measure_intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max()
+            > 0.0
+        ):
             return None
     tip = flush @ t.grips[0].T_part_tip
     width = t.grips[0].half_width
@@ -92,14 +107,14 @@ def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Arra
     flat = np.array(T)
     if sine > 0.0:
         flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
-    origin = T_floor @ plane_frame(floor)
-    height = float(n @ (flat[:3, 3] - origin[:3, 3])) + extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
+    origin = T_floor @ make_plane_frame(floor)
+    height = float(n @ (flat[:3, 3] - origin[:3, 3])) + measure_extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
     flat[:3, 3] -= height / float(n @ UP) * UP
-    corners = all_corners(scene.pieces[part])[0]
+    corners = collect_corners(scene.pieces[part])[0]
     heights = corners @ (flat[:3, :3].T @ n)
     feet = corners[heights < heights.min() + _LOWEST_M]
     on_floor = pose.apply(pose.inverse(origin) @ flat, feet)[:, :2]
-    if not own_shape(floor).covers(MultiPoint(on_floor).convex_hull):
+    if not flatten_face(floor).covers(MultiPoint(on_floor).convex_hull):
         return None
     return FlatPlacement(flat, n, feet[_far_apart(on_floor)])
 

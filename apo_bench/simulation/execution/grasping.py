@@ -14,17 +14,17 @@ from apo_bench.geometry import (
     Piece,
     Solid,
     all_boxes,
-    extent,
-    held_width,
-    holds,
+    find_holds,
     holds_whole,
-    intrusion_depths,
-    upright_bounds,
+    measure_extent,
+    measure_held_width,
+    measure_intrusion_depths,
+    measure_upright_bounds,
 )
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import Obstacle, gripper_boxes, obstacle, translate
+from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, make_obstacle, translate
 from apo_bench.simulation.scene import Scene
 
 _STAND_OFF_M = 0.012
@@ -71,9 +71,9 @@ class Grips(NamedTuple):
     second: Grasp | None = None
 
 
-def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
+def list_obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
     """Every part but these, where it is estimated to be."""
-    return tuple(obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
+    return tuple(make_obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
 
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
@@ -81,7 +81,7 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
     solid = scene.scenario.assembly.solids[part]
     if any(_clear(scene.kinematics, solid, [preferred], places, _MARGINS_M[-1])):
         return preferred
-    return first_clear(scene.kinematics, solid, _candidates(scene, solid, places[0].T), places) or preferred
+    return find_clear_grasp(scene.kinematics, solid, _candidates(scene, solid, places[0].T), places) or preferred
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
@@ -100,7 +100,7 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
         for grasp in able
         if _closed_depth(scene.kinematics, solid, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0
     ]
-    return first_clear(scene.kinematics, solid, able, [place])
+    return find_clear_grasp(scene.kinematics, solid, able, [place])
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
@@ -119,7 +119,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
     ):
         return Grips(preferred)
     everything = _candidates(scene, solid, places[0].T)
-    if one := first_clear(scene.kinematics, solid, everything, ends, [stroke]):
+    if one := find_clear_grasp(scene.kinematics, solid, everything, ends, [stroke]):
         return Grips(one)
     for margin in _MARGINS_M:
         able = [
@@ -132,7 +132,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
     return Grips(preferred)
 
 
-def tip_frame(grasp: Grasp, T_part: Array) -> Array:
+def make_tip_frame(grasp: Grasp, T_part: Array) -> Array:
     """The tip in the part's frame, (4, 4): looking down where the part stands like this, or as the grasp says, closing
     along `across`."""
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0]) if grasp.ahead is None else grasp.ahead
@@ -148,9 +148,9 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """Half of the width between the fingers of a part that stands at T, [m]: of boxes that of the part, where they hold
     that."""
     up = upwards(T) if grasp.ahead is None else -grasp.ahead
-    own = held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
+    own = measure_held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
     if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
-        low, high = extent(pieces, grasp.across)
+        low, high = measure_extent(pieces, grasp.across)
         return (high - low) / 2
     return own
 
@@ -190,7 +190,7 @@ def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
         around = _around_box(scene, solid, T)
         if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
-    return [Grasp(*hold) for hold in holds(solid, up, scene.arm.opening_m)]
+    return [Grasp(*hold) for hold in find_holds(solid, up, scene.arm.opening_m)]
 
 
 def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
@@ -211,7 +211,7 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     return grasps
 
 
-def first_clear(
+def find_clear_grasp(
     kinematics: Kinematics,
     solid: Solid,
     grasps: Sequence[Grasp],
@@ -289,7 +289,7 @@ def _is_clear(
 
 def _tips(grasp: Grasp, points: Array, T: Array) -> tuple[Array, Array]:
     """The orientation of the tip at a grasp of a part at T, (3, 3), and its places at such grasps of points, (k, 3)."""
-    R = (T @ tip_frame(replace(grasp, point=np.zeros(3)), T))[:3, :3]
+    R = (T @ make_tip_frame(replace(grasp, point=np.zeros(3)), T))[:3, :3]
     return R, points @ T[:3, :3].T + T[:3, 3]
 
 
@@ -310,7 +310,7 @@ def _closed_depth(
 ) -> Array:
     """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
     width = _known_width(solid.pieces, grasp, stroke.T)
-    tip = stroke.T @ tip_frame(grasp, stroke.T)
+    tip = stroke.T @ make_tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.direction
     return gripper_depth(kinematics, width, tip[:3, :3], at, stroke.around, margin)
 
@@ -322,12 +322,12 @@ def gripper_depth(
 
     What its way does not come by counts as far away.
     """
-    boxes = gripper_boxes(kinematics, opening, margin)
-    low, high = upright_bounds(boxes, R, np.zeros(3))
+    boxes = list_gripper_boxes(kinematics, opening, margin)
+    low, high = measure_upright_bounds(boxes, R, np.zeros(3))
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)
     depth = np.full(len(at), -1.0)
     for each in around:
         if (low < each.high).all() and (high > each.low).all():
-            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.pieces, each.T, 0.0))
+            depth = np.maximum(depth, measure_intrusion_depths(boxes, R, at, each.pieces, each.T, 0.0))
     return depth

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, physical_pieces
+from apo_bench.geometry import Array, shrink_pieces
 from apo_bench.planning.insertion.surroundings import later_walls, own_walls
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
@@ -15,11 +15,11 @@ from apo_bench.simulation.execution.grasping import (
     grasp_at,
     grips_along,
     half_width,
-    obstacles,
-    tip_frame,
+    list_obstacles,
+    make_tip_frame,
 )
 from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
-from apo_bench.simulation.robot import turn_from
+from apo_bench.simulation.robot import measure_turn
 from apo_bench.simulation.scene import Scene
 
 _WRIST_ENDS = 2.5
@@ -35,8 +35,8 @@ def transfer_grips(
         estimated: Where all parts are before the transfer.
         after: Where all parts are after it.
     """
-    start = RestingPart(estimated[part], obstacles(scene.scenario.assembly.solids, estimated, (part,)))
-    goal = RestingPart(after[part], obstacles(scene.scenario.assembly.solids, after, (part,)))
+    start = RestingPart(estimated[part], list_obstacles(scene.scenario.assembly.solids, estimated, (part,)))
+    goal = RestingPart(after[part], list_obstacles(scene.scenario.assembly.solids, after, (part,)))
     if into.level:
         stroke = Stroke(goal.T, into.direction, into.travel, goal.around)
         grips = grips_along(scene, part, preferred, (start,), stroke)
@@ -56,9 +56,9 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
     """The grasp as a pose of the tip; of the two ways round, the one that turns the wrist less."""
     other = replace(grasp, across=-grasp.across)
     rest = scene.kinematics.forward(scene.arm.home)
-    tips = [tip_frame(each, start) for each in (grasp, other)]
-    tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
-    pieces = physical_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
+    tips = [make_tip_frame(each, start) for each in (grasp, other)]
+    tip = min(tips, key=lambda T: max(abs(measure_turn(rest, start @ T)), abs(measure_turn(rest, goal @ T))))
+    pieces = shrink_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
     return Grip(tip, half_width(pieces, grasp, start))
 
 
@@ -72,7 +72,7 @@ def centring_grips(
     """
     part = assembly.operations[k].main
     sides = [macro.direction for macro in macros if macro.name == "slide-to-contact"]
-    place = RestingPart(after[part], obstacles(assembly.solids, after, (part,)))
+    place = RestingPart(after[part], list_obstacles(assembly.solids, after, (part,)))
     grasps = _across_walls(scene, part, grip, later_walls(assembly, k, part), place, sides)
     return tuple(_grip(scene, part, grasp, place.T, place.T) for grasp in grasps)
 
@@ -85,16 +85,18 @@ def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, estimat
     """
     part = assembly.operations[k].main
     T = estimated[part]
-    place = RestingPart(T, obstacles(assembly.solids, estimated, (part,)))
+    place = RestingPart(T, list_obstacles(assembly.solids, estimated, (part,)))
     walls = [*own_walls(assembly, k, part), *later_walls(assembly, k, part)]
-    pieces = physical_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
+    pieces = shrink_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
     rest = scene.kinematics.forward(scene.arm.home)
     turned = []
     for grasp in _across_walls(scene, part, grip, walls, place, ()):
-        ahead = tip_frame(grasp, T)[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
+        ahead = make_tip_frame(grasp, T)[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
         other = replace(grasp, across=-grasp.across)
-        tip, back = (tip_frame(each, T) for each in ((grasp, other) if ahead else (other, grasp)))
-        turned.append(Grip(back if abs(turn_from(rest, T @ tip)) > _WRIST_ENDS else tip, half_width(pieces, grasp, T)))
+        tip, back = (make_tip_frame(each, T) for each in ((grasp, other) if ahead else (other, grasp)))
+        turned.append(
+            Grip(back if abs(measure_turn(rest, T @ tip)) > _WRIST_ENDS else tip, half_width(pieces, grasp, T))
+        )
     return tuple(turned)
 
 

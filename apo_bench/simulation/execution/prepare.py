@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Plan, Poses, Step
-from apo_bench.geometry import Array, extent, pose, remembered
+from apo_bench.geometry import Array, measure_extent, pose, remember
 from apo_bench.planning.insertion.surroundings import (
     OVER_M,
     WALL_MARGIN_M,
@@ -19,7 +19,7 @@ from apo_bench.planning.insertion.surroundings import (
     slide_directions,
     slow_before,
 )
-from apo_bench.scenario.attach_lines import nominal_operations
+from apo_bench.scenario.attach_lines import list_nominal_operations
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.execution.flat_placement import find_flat_placement
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
@@ -30,13 +30,13 @@ from apo_bench.simulation.execution.transfer import (
     ApproachLine,
     Grip,
     Transfer,
-    after_transfer,
-    arrival_line,
+    compute_transferred_poses,
     departure_motions,
     key_poses,
     motions,
+    plan_arrival_line,
 )
-from apo_bench.simulation.robot import Trajectory, at_end, follow_waypoints, plan_waypoints
+from apo_bench.simulation.robot import Trajectory, follow_waypoints, plan_waypoints, solve_end_angles
 from apo_bench.simulation.scene import Scene
 
 _GRAVITY = 9.81
@@ -57,8 +57,8 @@ class Move(NamedTuple):
     transfer: Transfer
 
 
-@remembered
-def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
+@remember
+def plan_moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ...] = ()) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part stays with it.
 
     Cached: the plan check and the execution both need it.
@@ -80,7 +80,7 @@ def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ..
         if (
             step.undo
             and again
-            and not arrival_line(nominal_operations(scene.scenario)[k].after, plan.target_poses[k]).level
+            and not plan_arrival_line(list_nominal_operations(scene.scenario)[k].after, plan.target_poses[k]).level
         ):
             continue
         was = put_by.get(operation.main)
@@ -89,7 +89,7 @@ def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ..
         else:
             before.setdefault(k, (estimated[operation.main], was))
             put_by[operation.main] = k
-        after = after_transfer(operation, target, estimated)
+        after = compute_transferred_poses(operation, target, estimated)
         transfer = _transfer(plan.assembly, scene, step, was, target, estimated, after, spiral)
         if actions and not (step.undo or transfer.carried):
             transfer = _with_actions(plan.assembly, scene, k, transfer, estimated, actions)
@@ -100,17 +100,17 @@ def moves(plan: Plan, scene: Scene, spiral: bool = False, actions: tuple[str, ..
 
 def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
     """The transfer with its grips the other way round, where only that is in reach; the usual arm has room for one."""
-    if scene.arm.hand is None or not key_angles(transfer, scene).code:
+    if scene.arm.hand is None or not solve_key_angles(transfer, scene).code:
         return transfer
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     other = tuple(Grip(grip.T_part_tip @ half_turn, grip.half_width) for grip in transfer.grips)
     turned = replace(transfer, grips=other)
-    return transfer if key_angles(turned, scene).code else turned
+    return transfer if solve_key_angles(turned, scene).code else turned
 
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(key_angles(move.transfer, scene).code for move in moves(plan, scene, False))
+    return not any(solve_key_angles(move.transfer, scene).code for move in plan_moves(plan, scene, False))
 
 
 def _transfer(
@@ -135,15 +135,15 @@ def _transfer(
     operation = assembly.operations[k]
     part = operation.main
     start = estimated[part]
-    nominal = nominal_operations(scene.scenario)[k]
+    nominal = list_nominal_operations(scene.scenario)[k]
     leaves = nominal.after if undo or was == k else nominal.before
     comes = nominal.before if undo else nominal.after
     contacts = tuple(each.contact for each in comes.touched)
-    into = arrival_line(comes, target)
+    into = plan_arrival_line(comes, target)
     inserts = any(macro.inserts for macro in comes.macros)
     if undo and not into.level:
         into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    out = arrival_line(leaves, start)
+    out = plan_arrival_line(leaves, start)
     preferred = scene.scenario.grasps[k if was is None or not out.level else was]
     grips, out, into = transfer_grips(scene, part, preferred, out, into, estimated, after)
     macros = motions(comes, target, slide_directions(assembly, comes, after))
@@ -213,7 +213,7 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, direct
     T = {p: pose.inverse(poses[part]) @ poses[p] for p in moves}
 
     def ends(axis: Array) -> tuple[float, float]:
-        spans = [np.add(extent(scene.pieces[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
+        spans = [np.add(measure_extent(scene.pieces[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
         return float(np.min(spans)), float(np.max(spans))
 
     middle = np.array([np.mean(ends(axis)) for axis in np.eye(3)])
@@ -232,8 +232,8 @@ class KeyAngles(NamedTuple):
     """Where the search for the last of them ended, (joints,)."""
 
 
-@remembered
-def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
+@remember
+def solve_key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     """Joint angles at the tip poses that must be in reach; remembered, since who predicts a transfer and who carries it
     out ask for the same."""
     q = np.array(scene.arm.home)
@@ -245,7 +245,7 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
         if there is None and scene.arm.hand is not None:
             # Step by step from where the tip was, since a leap may end at the limit of a joint.
             start = scene.kinematics.forward(q) if before is None else before
-            there = at_end(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
+            there = solve_end_angles(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
         if there is None:
             break
         q = there

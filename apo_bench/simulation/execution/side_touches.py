@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, Face, extent, intrusion_depths, pose
+from apo_bench.geometry import Array, Face, measure_extent, measure_intrusion_depths, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import Obstacle, turn_from, with_height
+from apo_bench.simulation.robot import Obstacle, measure_turn, move_to_height
 from apo_bench.simulation.scene import Scene
 
 LEAN_RAD = float(np.radians(3.0))
@@ -83,8 +83,8 @@ def find_side_touches(
         deep = high - low - _OVER_M
         if face.fit or deep - _OVER_M < _APART_M:
             continue
-        (wall,) = obstacles(assembly.solids, estimated, tuple(set(assembly.solids) - {part}))
-        others = obstacles(assembly.solids, estimated, (t.part, part))
+        (wall,) = list_obstacles(assembly.solids, estimated, tuple(set(assembly.solids) - {part}))
+        others = list_obstacles(assembly.solids, estimated, (t.part, part))
         along = np.cross(UP, n)
         ends = corners @ along
         lines = np.arange(ends.min() + _STEP_M, ends.max(), _STEP_M)
@@ -105,15 +105,19 @@ def _upright_turns(scene: Scene, t: Transfer, upright: Array, n: Array) -> list[
     for to in (n, -n):
         turn = float(np.arctan2(np.cross(y, to) @ UP, y @ to))
         both.append(pose.exp(np.append(np.zeros(3), turn * UP))[:3, :3] @ upright)
-    return sorted(both, key=lambda R: abs(turn_from(rest, frame(R @ t.grips[0].T_part_tip[:3, :3], np.zeros(3)))))
+    return sorted(both, key=lambda R: abs(measure_turn(rest, frame(R @ t.grips[0].T_part_tip[:3, :3], np.zeros(3)))))
 
 
 def _at(scene: Scene, t: Transfer, R: Array, n: Array, edge: Array, up: float) -> SideTouch:
     """The part before the wall, leaned towards it, with a point of its side that is so high over its lowest one."""
     pieces = scene.pieces[t.part]
     along = np.cross(UP, n)
-    sides = extent(pieces, R.T @ along)
-    point = R.T @ ((extent(pieces, R.T @ UP)[0] + up) * UP + extent(pieces, R.T @ n)[0] * n + np.mean(sides) * along)
+    sides = measure_extent(pieces, R.T @ along)
+    point = R.T @ (
+        (measure_extent(pieces, R.T @ UP)[0] + up) * UP
+        + measure_extent(pieces, R.T @ n)[0] * n
+        + np.mean(sides) * along
+    )
     leaned = pose.exp(np.append(np.zeros(3), LEAN_RAD * np.cross(UP, -n)))[:3, :3] @ R
     return SideTouch(frame(leaned, edge + STAND_OFF_M * n - leaned @ point), -n, point, n, edge)
 
@@ -129,10 +133,10 @@ def _free(scene: Scene, t: Transfer, place: SideTouch, wall: Obstacle, others: t
     R = place.T[:3, :3]
     for each, shifts in ((wall, above), *((other, whole) for other in others)):
         at = place.T[:3, 3] + shifts
-        if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
+        if measure_intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
             return False
     at = tip[:3, 3] + whole
     if gripper_depth(scene.kinematics, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:
         return False
-    over = scene.kinematics.inverse(with_height(tip, t.safe), np.array(scene.arm.home))
+    over = scene.kinematics.inverse(move_to_height(tip, t.safe), np.array(scene.arm.home))
     return over is not None and scene.kinematics.inverse(tip, over) is not None

@@ -11,7 +11,7 @@ from apo_bench.planning.insertion.arrival import Arrival
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.insertion.macros import MacroName
 from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
-from apo_bench.simulation.robot import translate, with_height
+from apo_bench.simulation.robot import move_to_height, translate
 
 _AHEAD_M = 0.01
 """A motion from above is guarded from so far above where it turns slow."""
@@ -168,7 +168,7 @@ class Transfer:
         return replace(self, grips=grips, centring=centring, squaring=squaring)
 
 
-def after_transfer(operation: Operation, target: Array, poses: Poses) -> Poses:
+def compute_transferred_poses(operation: Operation, target: Array, poses: Poses) -> Poses:
     """Where all parts are once the main part of an operation was brought to a pose, (4, 4), with what it carries."""
     T = target @ pose.inverse(poses[operation.main])
     return {**poses, **{part: T @ poses[part] for part in operation.moves}}
@@ -188,8 +188,8 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     goal = t.T_world_goal @ last
     free = translate(t.T_world_start @ carrying, t.out.direction, -t.out.travel)
     before = translate(t.T_world_goal @ carrying, t.into.direction, -t.into.travel)
-    above, over = (with_height(T, max(t.safe, T[2, 3])) for T in (free, before))
-    return (hover(pick), pick, *([free] if t.out.level else []), above), (over, before, goal)
+    above, over = (move_to_height(T, max(t.safe, T[2, 3])) for T in (free, before))
+    return (find_hover_pose(pick), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
 
 def is_tilted(T_tip: Array) -> bool:
@@ -197,14 +197,14 @@ def is_tilted(T_tip: Array) -> bool:
     return bool(T_tip[2, 2] > -_DOWN)
 
 
-def hover(grasp: Array) -> Array:
+def find_hover_pose(grasp: Array) -> Array:
     """Where the tip comes to a stand before it goes on to a grasp: above it, of a tilted one straight back."""
     if is_tilted(grasp):
         return translate(grasp, grasp[:3, 2], -_HOVER_M)
-    return with_height(grasp, float(grasp[2, 3]) + _HOVER_M)
+    return move_to_height(grasp, float(grasp[2, 3]) + _HOVER_M)
 
 
-def arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
+def plan_arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
     """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
     if not arrival.touched:
         return ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)

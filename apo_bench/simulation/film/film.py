@@ -15,7 +15,7 @@ from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.film.track import FilmMoment, Segment
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING
-from apo_bench.simulation.scene import aim_camera, initial_state, place_for_picture, save_film
+from apo_bench.simulation.scene import aim_camera, make_initial_state, place_for_picture, save_film
 
 _LETTERS = 86  # in a line of the usual width
 _SIZE = (720, 480)
@@ -60,7 +60,7 @@ def frames(
                 framing = frame_parts(assembly, states, headroom_m=_HEADROOM_M)
                 camera = aim_camera(*framing, FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)
                 views.append((stack.enter_context(renderer(segment.world.model, *size)), camera))
-            data = initial_state(segment.world, segment.start)
+            data = make_initial_state(segment.world, segment.start)
             for moment, force_n, most_n in sample_moments(segment.moments, speed / fps):
                 empty = moment.phase.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"

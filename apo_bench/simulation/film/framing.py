@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, world_bounds
+from apo_bench.geometry import Array, measure_world_bounds
 
 _NEAREST_M = 0.09
 """How far the camera stands off: this and the diagonal of what it looks at."""
@@ -29,6 +29,6 @@ def frame_parts(
         headroom_m: What is seen above them.
     """
     shown = assembly.solids.keys() - assembly.fixed if parts is None else parts
-    low, high = world_bounds((assembly.solids[part], poses[part]) for poses in states for part in sorted(shown))
+    low, high = measure_world_bounds((assembly.solids[part], poses[part]) for poses in states for part in sorted(shown))
     high = high + np.array([0.0, 0.0, headroom_m])
     return Framing((low + high) / 2, _NEAREST_M + float(np.linalg.norm(high - low)))

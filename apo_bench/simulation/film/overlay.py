@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import PartFace, Poses
 from apo_bench.geometry import Array, Face, pose
-from apo_bench.simulation.film.track import FilmMoment, Segment, part_poses
+from apo_bench.simulation.film.track import FilmMoment, Segment, read_part_poses
 from apo_bench.simulation.scene import Scene, set_part_pose
 
 Color = tuple[float, float, float]
@@ -25,7 +25,7 @@ class Overlay(NamedTuple):
     color: Color
 
 
-class Snapshot(NamedTuple):
+class FilmSnapshot(NamedTuple):
     """One moment with what is laid over it."""
 
     segment: Segment
@@ -36,13 +36,13 @@ class Snapshot(NamedTuple):
     overlays: tuple[Overlay, ...]
 
 
-def draw_over(scene: Scene, snapshot: Snapshot, drawn: Any) -> None:
+def draw_over(scene: Scene, snapshot: FilmSnapshot, drawn: Any) -> None:
     """Draw into an abstract scene of MuJoCo (`mjvScene`), after what it holds."""
     for overlay in snapshot.overlays:
         _draw_parts(scene, overlay, drawn)
     for hand in snapshot.moment.hands:
         _geom(drawn, mujoco.mjtGeom.mjGEOM_SPHERE, HAND_M, hand, (*HAND_COLOR, 0.8))
-    poses = part_poses(snapshot.segment, snapshot.moment)
+    poses = read_part_poses(snapshot.segment, snapshot.moment)
     for face in snapshot.faces:
         at = pose.apply(poses[face.part], label_place(scene, face)[None])[0]
         named = _geom(drawn, mujoco.mjtGeom.mjGEOM_LABEL, 0.01, at, (0.1, 0.1, 0.1, 1.0))

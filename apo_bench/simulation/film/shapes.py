@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.film.overlay import Snapshot, draw_over
+from apo_bench.simulation.film.overlay import FilmSnapshot, draw_over
 from apo_bench.simulation.film.track import show_moment
 from apo_bench.simulation.scene import Scene
 
@@ -36,7 +36,7 @@ class Shape(NamedTuple):
     """(7,): x, y, z [m], then a quaternion, w first."""
 
 
-def shapes_of(scene: Scene, data: Any, snapshot: Snapshot) -> Iterator[Shape]:
+def shapes_of(scene: Scene, data: Any, snapshot: FilmSnapshot) -> Iterator[Shape]:
     """Everything that is to be seen, planes excepted; `data` is brought to that moment."""
     model = scene.work.model
     show_moment(scene, data, snapshot.segment, snapshot.moment)

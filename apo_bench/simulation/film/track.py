@@ -5,12 +5,12 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Plan, Poses, placements
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.assembly import Plan, Poses, compute_placements
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.simulation.hooks import Hooks, Phase
-from apo_bench.simulation.scene import Scene, World, arm_home, initial_state, place_for_picture, set_part_pose
+from apo_bench.simulation.scene import Scene, World, make_initial_state, move_arm_home, place_for_picture, set_part_pose
 
-_NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
+_NO_HANDS = copy_frozen(np.zeros((0, 3)), None, 3)
 _IN_PLACE = "in place"
 
 
@@ -63,10 +63,10 @@ class FilmTrack:
 def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
     """The nominal assembly of a scenario: the parts before the first operation and after each, a second apart."""
     world = scene.work
-    data = initial_state(world, start)
+    data = make_initial_state(world, start)
     moments = list[FilmMoment]()
-    arm_home(scene, data)
-    for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
+    move_arm_home(scene, data)
+    for k, poses in enumerate((start, *compute_placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
             set_part_pose(world, data, part, poses[part])
         phase = Phase(None if k < 0 else k, _IN_PLACE, 0.0)
@@ -74,7 +74,7 @@ def scenario_segment(scene: Scene, start: Poses, goals: Array) -> Segment:
     return Segment(f"{scene.scenario.name}: as the scenario states it", world, start, tuple(moments), "", None)
 
 
-def part_poses(segment: Segment, moment: FilmMoment) -> Poses:
+def read_part_poses(segment: Segment, moment: FilmMoment) -> Poses:
     """Where every part is, world frame, [m]."""
     free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in segment.world.qpos.items()}
     return {**{part: segment.start[part] for part in segment.world.fixed}, **free}
@@ -85,8 +85,8 @@ def show_moment(scene: Scene, data: Any, segment: Segment, moment: FilmMoment) -
     if segment.world is scene.work:
         data.qpos[:] = moment.qpos
     else:
-        arm_home(scene, data)
-        for part, T in part_poses(segment, moment).items():
+        move_arm_home(scene, data)
+        for part, T in read_part_poses(segment, moment).items():
             if part in scene.work.qpos:
                 set_part_pose(scene.work, data, part, T)
     place_for_picture(scene.work.model, data)

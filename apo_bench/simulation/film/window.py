@@ -11,10 +11,10 @@ from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
 from apo_bench.simulation.film.framing import frame_parts
-from apo_bench.simulation.film.overlay import Snapshot, draw_over
+from apo_bench.simulation.film.overlay import FilmSnapshot, draw_over
 from apo_bench.simulation.film.track import show_moment
 from apo_bench.simulation.graphics import need_window
-from apo_bench.simulation.scene import Scene, initial_state
+from apo_bench.simulation.scene import Scene, make_initial_state
 
 WINDOW_KEYS = {
     32: "play",
@@ -49,7 +49,7 @@ def no_window() -> str:
 def step_in_window(
     scene: Scene,
     assembled: Poses,
-    now: Callable[[], Snapshot],
+    now: Callable[[], FilmSnapshot],
     press: Callable[[str], None],
     pass_time: Callable[[float], None],
 ) -> None:
@@ -63,7 +63,7 @@ def step_in_window(
     """
     import mujoco.viewer
 
-    data = initial_state(scene.work, now().segment.start)
+    data = make_initial_state(scene.work, now().segment.start)
     pressed: list[str] = []
 
     def on_key(code: int) -> None:
@@ -89,7 +89,7 @@ def step_in_window(
             before = now_s
 
 
-def _draw(scene: Scene, data: Any, snapshot: Snapshot, window: Any) -> None:
+def _draw(scene: Scene, data: Any, snapshot: FilmSnapshot, window: Any) -> None:
     show_moment(scene, data, snapshot.segment, snapshot.moment)
     window.user_scn.ngeom = 0
     draw_over(scene, snapshot, window.user_scn)

@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import Demonstration, Layout, Reached, Snapshot, placements
+from apo_bench.assembly import Demonstration, Layout, ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
-from apo_bench.records import sentence
+from apo_bench.records import describe_outcome
 from apo_bench.scenario import (
     HumanError,
-    human_error_covariance,
+    compute_human_error_covariance,
     spread_error,
 )
 from apo_bench.scenario.human_error import ErrorSpread
@@ -21,7 +21,7 @@ from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands, PartLost
 from apo_bench.simulation.human.operation import plan_hand_operation
 from apo_bench.simulation.human.performing import STAND_STILL_S, perform
-from apo_bench.simulation.scene import Scene, allow_sleep, has_failed, is_unstable, snapshot
+from apo_bench.simulation.scene import Scene, allow_sleep, has_failed, is_unstable, take_snapshot
 
 
 @check_arguments
@@ -32,13 +32,15 @@ def demonstrate(
     rng: np.random.Generator,
     watch: Hooks | Callable[[Any], None] | None = None,
 ) -> Demonstration:
-    """Assemble by hand, with the human error of the scenario times `human_error`.
+    """Simulate the demonstration by a human, with the human error of the scenario times `human_error`.
 
     The operation that the scenario names has the error, and parts that are placed against its part follow it. At the
     last operation the other hand corrects all of them; these small motions show in `final`, not in `poses`, since these
     parts are not observed again.
 
     Args:
+        scene: From `build_scene`.
+        layout: From `draw_layout`.
         human_error: 0 is an ideal human, 1 the human error of the scenario, another number a multiple of it.
         rng: The same numbers are drawn whatever `human_error` is, so that errors of one seed differ in size only.
         watch: Called with the `MjData` at the start and every `period_s` of simulated time, an attribute of it, by
@@ -66,7 +68,7 @@ def demonstrate(
         start=layout.start,
         poses=goals,
         final=final,
-        human_error_covariance=human_error_covariance(scenario, human_error),
+        human_error_covariance=compute_human_error_covariance(scenario, human_error),
         code="demonstration_failed" if why else "ok",
         why=why,
         gap_m=1e-3 * scenario.gap_mm,
@@ -77,7 +79,7 @@ def demonstrate(
 def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) -> list[Snapshot]:
     """Do all operations; what stands where after each, and when all is done."""
     scenario = scene.scenario
-    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.poses))
+    stages = (layout.start, *compute_placements(scenario.assembly, layout.start, layout.poses))
     after = []
     with allow_sleep(scene.shown, True):
         hands.wait(0.05)
@@ -86,10 +88,10 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
             target = layout.poses[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
             late = error.left if k == len(scenario.assembly) - 1 else ()
             perform(hands, plan_hand_operation(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
-            after.append(snapshot(scene.shown, hands.data, layout.start))
+            after.append(take_snapshot(scene.shown, hands.data, layout.start))
             hands.end(k)
         hands.wait(STAND_STILL_S)
-    return [*after, snapshot(scene.shown, hands.data, layout.start)]
+    return [*after, take_snapshot(scene.shown, hands.data, layout.start)]
 
 
 def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) -> Array:
@@ -103,11 +105,11 @@ def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) 
 
 def _wrong(scene: Scene, layout: Layout, after: list[Snapshot]) -> str:
     """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
-    reached = Reached(after=tuple(after[:-1]), final=after[-1])
+    reached = ReachedState(after=tuple(after[:-1]), final=after[-1])
     demonstrated = judge(scene.scenario.assembly, reached, layout.poses, scene.criteria).demonstrated
     fault = next((fault for fault, there in demonstrated.conditions.items() if there and fault != "pushed"), None)
     if fault is None:
         return ""
     bad = next((c for c in demonstrated.contacts if not c.strict), None)
     where = f" ({bad.contact}, operation {bad.operation + 1})" if bad and fault in ("gap", "overlap") else ""
-    return sentence(fault) + where
+    return describe_outcome(fault) + where

@@ -12,8 +12,8 @@ from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
-from apo_bench.simulation.robot import TINY_S, Moving, Trajectory, near_spans, take_along
-from apo_bench.simulation.scene import HANDS, Scene, allow_sleep, initial_state, part_pose
+from apo_bench.simulation.robot import TINY_S, MovingPieces, Trajectory, find_near_spans, take_along
+from apo_bench.simulation.scene import HANDS, Scene, allow_sleep, get_part_pose, make_initial_state
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
@@ -38,7 +38,7 @@ class Hands:
     def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
         self.scene = scene
         self.world = scene.shown
-        self.data: Any = initial_state(self.world, start)
+        self.data: Any = make_initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
         self._hooks = as_hooks(watch)
         self._operation: int | None = None
@@ -60,7 +60,7 @@ class Hands:
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""
-        return part_pose(self.world, self.data, part)
+        return get_part_pose(self.world, self.data, part)
 
     def grab(self, hand: int, part: str) -> Array:
         """Take a part where it is, at its frame; returns its pose.
@@ -117,9 +117,9 @@ class Hands:
         """Which steps of a line are simulated: those where something is near; at last the end."""
         tip = pose.inverse(line.start)
         held = tuple(self._held[hand])
-        moving = [Moving(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
+        moving = [MovingPieces(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
         s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
-        spans = near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
+        spans = find_near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _fast_forward(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
@@ -128,7 +128,7 @@ class Hands:
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
         for part, T_hand_part in self._held[hand].items():
             # Where the hand would be that has the part where it is: the part trails behind the real one.
-            before = part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
+            before = get_part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
             take_along(self.world, data, (part,), (before, after, later))
         self._put(data, hand, line.poses(line.progress(at[:1] / n))[0])
 

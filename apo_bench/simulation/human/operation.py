@@ -11,7 +11,7 @@ from apo_bench.planning.insertion.arrival import Arrival
 from apo_bench.planning.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.scenario import (
     Scenario,
-    nominal_operations,
+    list_nominal_operations,
 )
 
 _SIDE_M = 0.002
@@ -62,7 +62,7 @@ def plan_hand_operation(
     """
     assembly = scenario.assembly
     operation = assembly.operations[k]
-    nominal = nominal_operations(scenario)[k]
+    nominal = list_nominal_operations(scenario)[k]
     direction = target[:3, :3] @ nominal.after.line.direction
     on_floor = any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in nominal.after.touched)
     top, bottom = ends_of(assembly, operation.moves, stages[k])

@@ -6,7 +6,13 @@ from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.operation import HandOperation
-from apo_bench.simulation.robot import Trajectory, minimum_jerk, smooth_trajectory, translate, with_height
+from apo_bench.simulation.robot import (
+    Trajectory,
+    interpolate_minimum_jerk,
+    move_to_height,
+    smooth_trajectory,
+    translate,
+)
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
@@ -36,7 +42,7 @@ def perform(hands: Hands, operation: HandOperation, clearance_m: float) -> None:
     if operation.out.any():
         T = _free(hands, T, operation.out, clearance_m)
     safe = max(_SAFE_M, operation.over, before[2, 3])
-    for end in (with_height(T, max(safe, T[2, 3])), with_height(before, safe), before):
+    for end in (move_to_height(T, max(safe, T[2, 3])), move_to_height(before, safe), before):
         hands.move((0, smooth_trajectory(T, end, _SPEED, turn_speed=4.0)))
         T = end
     for part in (part for part in operation.late if part in operation.carries):
@@ -107,7 +113,7 @@ def _adjust(
     here = hands.grab(1, part)
     if held:
         hands.let_go(0, part)
-    there = with_height(true, here[2, 3])
+    there = move_to_height(true, here[2, 3])
     hands.move((1, smooth_trajectory(here, translate(here, UP, lift), _NUDGE)))
     hands.move((1, smooth_trajectory(translate(here, UP, lift), translate(there, UP, lift), _SHIFT)), *meanwhile)
     hands.move((1, smooth_trajectory(translate(there, UP, lift), there, _NUDGE)))
@@ -115,4 +121,6 @@ def _adjust(
 
 def _first(stroke: Trajectory, fraction: float) -> Trajectory:
     """The first part of a stroke, as a motion."""
-    return Trajectory(stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, minimum_jerk)
+    return Trajectory(
+        stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, interpolate_minimum_jerk
+    )

@@ -1,21 +1,21 @@
 """The arm in motion: it follows lines and measures contact forces."""
 
-from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
+from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_wrist, servo, zero
 from apo_bench.simulation.robot.forces import Guard, LowPass
-from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along, weld
-from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, obstacle
+from apo_bench.simulation.robot.obstacles import MovingPieces, Obstacle, find_near_spans, make_obstacle
 from apo_bench.simulation.robot.paths import (
     Trajectory,
-    minimum_jerk,
-    paced_trajectory,
+    interpolate_minimum_jerk,
+    measure_turn,
+    move_to_height,
+    plan_paced_trajectory,
+    plan_steady_trajectory,
     smooth_trajectory,
-    steady_trajectory,
     translate,
-    turn_from,
-    with_height,
 )
-from apo_bench.simulation.robot.reach import at_end, follow_waypoints, plan_waypoints
+from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints, solve_end_angles
 from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
@@ -23,9 +23,9 @@ from apo_bench.simulation.robot.wrist import (
     BANDWIDTH_HZ,
     READING_S,
     WristSensor,
-    filtered_noise,
-    low_pass_part,
-    part_loads,
+    compute_low_pass_gain,
+    compute_part_loads,
+    filter_noise,
 )
 
 __all__ = (
@@ -36,34 +36,34 @@ __all__ = (
     "GraspSlipMonitor",
     "Guard",
     "LowPass",
-    "Moving",
+    "MovingPieces",
     "Obstacle",
     "Robot",
     "RobotError",
     "Trajectory",
     "WristSensor",
-    "at_end",
     "comply",
-    "filtered_noise",
+    "compute_low_pass_gain",
+    "compute_part_loads",
+    "filter_noise",
+    "find_near_spans",
     "follow_waypoints",
-    "gripper_boxes",
-    "low_pass_part",
-    "minimum_jerk",
-    "near_spans",
-    "obstacle",
-    "paced_trajectory",
-    "part_loads",
+    "get_wrist",
+    "interpolate_minimum_jerk",
+    "list_gripper_boxes",
+    "make_obstacle",
+    "measure_turn",
+    "move_to_height",
+    "plan_paced_trajectory",
+    "plan_steady_trajectory",
     "plan_waypoints",
     "press",
-    "reading",
+    "read_wrist",
     "servo",
     "smooth_trajectory",
-    "steady_trajectory",
+    "solve_end_angles",
     "take_along",
     "translate",
-    "turn_from",
     "weld",
-    "with_height",
-    "wrist_of",
     "zero",
 )

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.records import ft_noise
+from apo_bench.records import parse_ft_noise
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, translate
 from apo_bench.simulation.robot.reach import joint_gradients
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
-from apo_bench.simulation.scene import wrist_sensors_on
+from apo_bench.simulation.scene import switch_wrist_sensors_on
 
 ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
@@ -51,17 +51,17 @@ def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
     robot.T = translate(robot.T, offset, 1.0)
 
 
-def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
+def get_wrist(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
     """The sensor of a robot, by the name of its noise.
 
     Raises:
         InputError: An unknown name, or a number that is not allowed.
     """
-    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, ft_noise(name), rng, bandwidth_hz)
+    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, parse_ft_noise(name), rng, bandwidth_hz)
 
 
 @contextmanager
-def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
+def read_wrist(robot: Robot, wrist: WristSensor) -> Iterator[None]:
     """The wrist reads at every step, and guards of motions are its; what the robot does here stands still at first."""
     if robot.wrist is wrist:
         yield
@@ -70,7 +70,7 @@ def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
     robot.wrist, robot.fidelity = wrist, "full"
     wrist.begin(hand_load(robot.scene.kinematics, robot.opening()))
     try:
-        with wrist_sensors_on(robot.model):
+        with switch_wrist_sensors_on(robot.model):
             robot.wait(_SETTLE_S)
             yield
     finally:
@@ -83,7 +83,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
     Raises:
         ExecutionAborted: Something went wrong meanwhile.
     """
-    with reading(robot, wrist):
+    with read_wrist(robot, wrist):
         robot.stand()
         wrist.start_zero()
         robot.wait(seconds)
@@ -108,7 +108,7 @@ def press(robot: Robot, line: Trajectory, direction: Array, newton: float, wrist
     Raises:
         ExecutionAborted: The line leaves the arm's reach, or something went wrong on the way.
     """
-    with reading(robot, wrist):
+    with read_wrist(robot, wrist):
         return robot.follow(line, Guard(direction, newton)) or None
 
 
@@ -124,7 +124,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
     Raises:
         ExecutionAborted: The arm does not reach around there, or something went wrong on the way.
     """
-    with reading(robot, wrist):
+    with read_wrist(robot, wrist):
         q = robot.q
         offset = np.zeros(6)
         checked = offset

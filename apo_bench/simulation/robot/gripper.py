@@ -38,7 +38,7 @@ def open_hand(kinematics: Kinematics, opening: float) -> tuple[Any, Array]:
 
 
 @lru_cache(maxsize=64)
-def gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
+def list_gripper_boxes(kinematics: Kinematics, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
     """The geoms of the gripper that can touch something, in the frame of the tip, each as the box around it.
 
     Args:

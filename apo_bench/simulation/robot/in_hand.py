@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.frames import body_frame, quaternion
-from apo_bench.simulation.scene import Scene, World, part_pose, set_part_pose, touches_others
+from apo_bench.simulation.scene import Scene, World, get_part_pose, set_part_pose, touches_others
 
 SLIPS_M = 5e-5
 """What moves farther in the hand in a tick does not creep: it slips."""
@@ -40,7 +40,7 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
     """
     if touches_others(world, data, carried.parts):
         return carried._replace(T_tip_part=None)
-    now = part_pose(world, data, carried.parts[0])
+    now = get_part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
         wanted = T_world_tip @ carried.T_tip_part
         if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:
@@ -48,7 +48,7 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
             for part in carried.parts:
                 v = world.dof[part]
                 velocity = np.array(data.qvel[v : v + 6])
-                set_part_pose(world, data, part, shift @ part_pose(world, data, part))
+                set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
                 data.qvel[v : v + 6] = velocity
             return carried
     return carried._replace(T_tip_part=pose.inverse(T_world_tip) @ now)
@@ -91,7 +91,7 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
     D = (later[:3, :3] @ after[:3, :3].T) / (2 * TINY_S)
     spin = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
     for part in held:
-        T = way @ part_pose(world, data, part)
+        T = way @ get_part_pose(world, data, part)
         set_part_pose(world, data, part, T)
         v = world.dof[part]
         # v = v_frame + spin x lever; MuJoCo has the spin of a free body in the frame of the body.

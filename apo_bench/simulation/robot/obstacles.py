@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Ints, Piece, intrusion_depths, pose, upright_bounds
+from apo_bench.geometry import Array, Ints, Piece, measure_intrusion_depths, measure_upright_bounds, pose
 from apo_bench.simulation.frames import body_frame
-from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene import Scene, World, part_pose
+from apo_bench.simulation.scene import Scene, World, get_part_pose
 
 NEAR_HELD_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
@@ -44,29 +44,29 @@ class Obstacle(NamedTuple):
     high: Array
 
 
-def obstacle(pieces: tuple[Piece, ...], T: Array) -> Obstacle:
+def make_obstacle(pieces: tuple[Piece, ...], T: Array) -> Obstacle:
     """A part that rests at T."""
-    return Obstacle(pieces, T, *upright_bounds(pieces, T[:3, :3], T[:3, 3]))
+    return Obstacle(pieces, T, *measure_upright_bounds(pieces, T[:3, :3], T[:3, 3]))
 
 
-class Moving(NamedTuple):
+class MovingPieces(NamedTuple):
     """Pieces that move with the tip, in their own frame."""
 
     pieces: tuple[Piece, ...]
     T_tip: Array
 
 
-def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[Moving]:
+def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[MovingPieces]:
     """The gripper at an opening [m], and the parts that it holds, as they move with the tip."""
     inverse = pose.inverse(T_tip)
-    parts = [Moving(scene.pieces[part], inverse @ part_pose(scene.work, data, part)) for part in held]
-    return [Moving(gripper_boxes(scene.kinematics, round(opening, 4)), np.eye(4)), *parts]
+    parts = [MovingPieces(scene.pieces[part], inverse @ get_part_pose(scene.work, data, part)) for part in held]
+    return [MovingPieces(list_gripper_boxes(scene.kinematics, round(opening, 4)), np.eye(4)), *parts]
 
 
-def near_spans(
+def find_near_spans(
     scene: Scene,
     data: Any,
-    moving: Iterable[Moving],
+    moving: Iterable[MovingPieces],
     held: tuple[str, ...],
     line: Trajectory,
     s: Array,
@@ -89,18 +89,20 @@ def near_spans(
     others = [part for part in (*world.free, *world.fixed) if part not in held]
     if not _still(world, data, others):
         return [(0, n)]
-    obstacles = [obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
+    obstacles = [make_obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
     places = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(line.length))), n))
     near = _near(moving, obstacles, line, s[places], near_m[len(held) > 1])
     return _spans(near, places, n, run_up_s, float(scene.physics.timestep_s))
 
 
-def clear(scene: Scene, data: Any, moving: Iterable[Moving], T: Array) -> bool:
+def clear(scene: Scene, data: Any, moving: Iterable[MovingPieces], T: Array) -> bool:
     """Whether nothing is near the empty hand while the tip stands at T."""
-    return not near_spans(scene, data, moving, (), Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
+    return not find_near_spans(scene, data, moving, (), Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
 
 
-def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float) -> _Flags:
+def _near(
+    moving: Iterable[MovingPieces], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float
+) -> _Flags:
     """(k,), at which places along the line something is near.
 
     What turns is taken as the box around all that it sweeps, and nothing else is checked.
@@ -113,7 +115,7 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
     turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
     bounds = np.array([(each.low, each.high) for each in obstacles])
     for pieces, T_tip in moving:
-        low, high = upright_bounds(pieces, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
+        low, high = measure_upright_bounds(pieces, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
         if turns:
             low, high = _swept(low, high, R @ line.turn)
         low = tips + (low - margin)
@@ -127,7 +129,7 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
                 near[look] = (
-                    intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
+                    measure_intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
                     > -margin
                 )
     return near
@@ -178,4 +180,4 @@ def _still(world: World, data: Any, parts: Iterable[str]) -> bool:
 
 
 def _pose(world: World, data: Any, part: str) -> Array:
-    return part_pose(world, data, part) if part in world.dof else body_frame(data, world.body[part])
+    return get_part_pose(world, data, part) if part in world.dof else body_frame(data, world.body[part])

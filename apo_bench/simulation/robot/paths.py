@@ -61,16 +61,16 @@ def smooth_trajectory(start: Array, end: Array, speed: float, turn_speed: float 
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
     turn = float(np.linalg.norm(_turn_between(start, end)))
     seconds = max(_SHORTEST_S, _PEAK * distance(start, end) / speed, _PEAK * turn / turn_speed)
-    return Trajectory(start, end, seconds, minimum_jerk)
+    return Trajectory(start, end, seconds, interpolate_minimum_jerk)
 
 
-def steady_trajectory(start: Array, end: Array, speed: float) -> Trajectory:
+def plan_steady_trajectory(start: Array, end: Array, speed: float) -> Trajectory:
     """Constant speed [m/s] with a short ramp at both ends, for motions that a guard may stop."""
     seconds = max(distance(start, end) / speed + _RAMP_S, 2.0 * _RAMP_S)
     return Trajectory(start, end, seconds, _Trapezoid(_RAMP_S / seconds))
 
 
-def paced_trajectory(
+def plan_paced_trajectory(
     start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]
 ) -> Trajectory:
     """As `steady`, at one speed [m/s] along some stretches, from and to so far from the start, [m], else at another."""
@@ -92,7 +92,7 @@ def paced_trajectory(
     return Trajectory(start, end, float(t[-1]), _Table(t / t[-1], x / far))
 
 
-def minimum_jerk(t: Array) -> Array:
+def interpolate_minimum_jerk(t: Array) -> Array:
     """10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan, 1985)."""
     return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
 
@@ -133,7 +133,7 @@ def _turn_between(start: Array, end: Array) -> Array:
     return pose.log(T)[3:]
 
 
-def turn_from(rest: Array, T: Array) -> float:
+def measure_turn(rest: Array, T: Array) -> float:
     """How far a tip that looks down is turned about the vertical from its rest, -pi to pi, [rad]."""
     a = rest[:2, 0]
     b = T[:2, 0]
@@ -146,8 +146,8 @@ def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...
     The shorter way round may lead over a half turn away from the rest, where the wrist ends; then the other way is
     taken, with a pose in the middle.
     """
-    a = turn_from(rest, start)
-    b = turn_from(rest, end)
+    a = measure_turn(rest, start)
+    b = measure_turn(rest, end)
     if abs(b - a) <= np.pi:
         return (end,)
     return (_halfway(start, (start[:3, 3] + end[:3, 3]) / 2, b - a), end)
@@ -167,7 +167,7 @@ def waypoints_around(base: Array, rest: Array, start: Array, end: Array) -> tupl
     turn = (angle(start) + angle(end)) / 2 + np.arctan2(front[1], front[0])
     far = max(float(np.linalg.norm(T[:2, 3] - base[:2])) for T in (start, end))
     at = np.array([base[0] + far * np.cos(turn), base[1] + far * np.sin(turn), max(start[2, 3], end[2, 3])])
-    return (_halfway(start, at, turn_from(rest, end) - turn_from(rest, start)), end)
+    return (_halfway(start, at, measure_turn(rest, end) - measure_turn(rest, start)), end)
 
 
 def _halfway(start: Array, at: Array, turn: float) -> Array:
@@ -186,7 +186,7 @@ def translate(T: Array, along: Array, by: float) -> Array:
     return out
 
 
-def with_height(T: Array, height: float) -> Array:
+def move_to_height(T: Array, height: float) -> Array:
     """The pose lifted or lowered to a height in the world, [m]."""
     out = np.array(T)
     out[2, 3] = height

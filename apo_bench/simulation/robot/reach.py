@@ -51,7 +51,7 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
     return None if known is None else np.asarray(CubicSpline(*known)(s))
 
 
-def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
+def solve_end_angles(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
     for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):
         knots = _knots(

@@ -21,13 +21,21 @@ from apo_bench.simulation.hooks import TICK_S, Hooks, Phase, as_hooks
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, fast_forward, hold_steady, take_along, weld
-from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
+from apo_bench.simulation.robot.obstacles import clear, find_near_spans, moving_with_tip
 from apo_bench.simulation.robot.paths import Trajectory, distance, smooth_trajectory
-from apo_bench.simulation.robot.reach import along, at_end, feedforward_command, limit_speed, plan_waypoints
+from apo_bench.simulation.robot.reach import along, feedforward_command, limit_speed, plan_waypoints, solve_end_angles
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.robot.wrist import WristSensor
-from apo_bench.simulation.scene import Scene, has_failed, initial_state, is_unstable, part_pose, sensors_off, timestep
+from apo_bench.simulation.scene import (
+    Scene,
+    get_part_pose,
+    has_failed,
+    is_unstable,
+    make_initial_state,
+    switch_sensors_off,
+    use_timestep,
+)
 
 _REST_RAD_S = 2e-3  # joints that move slower rest
 _REST_M_S = 3e-3  # fingers that move slower rest
@@ -95,7 +103,7 @@ class Robot:
         self.T: Array = scene.kinematics.forward(self.q)
         self._rest = self.T
         self._fingers = fingers_of(model, self.arm)
-        self.data: Any = initial_state(scene.work, start)
+        self.data: Any = make_initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.q + self._off
         self._fingers.put(self.data, self.arm.opening_m)
         self.data.ctrl[:] = 0.0
@@ -130,7 +138,7 @@ class Robot:
         for begin, end in self._spans(line, s):
             q = self.q
             if begin > done:
-                q = self.reached(at_end(kinematics, line, s[done], s[begin], q))
+                q = self.reached(solve_end_angles(kinematics, line, s[done], s[begin], q))
             path = self.reached(along(kinematics, line, s[begin : end + 1], q, knots))
             velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
             if begin > done:
@@ -177,7 +185,7 @@ class Robot:
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._steps_of_tick):
             n = min(self._steps_of_tick, steps - done)
-            with timestep(self.model, self.step_s / parts):
+            with use_timestep(self.model, self.step_s / parts):
                 self._tick(np.repeat(command, parts * n, axis=0))
             if n == self._steps_of_tick:
                 self._look()
@@ -238,7 +246,7 @@ class Robot:
 
     def in_hand(self) -> Array:
         """The held part in the frame of the tip, (4, 4), for `GraspSlipMonitor`: nothing is decided by it."""
-        return np.asarray(pose.inverse(self.tip()) @ part_pose(self.scene.work, self.data, self.forces.held[0]))
+        return np.asarray(pose.inverse(self.tip()) @ get_part_pose(self.scene.work, self.data, self.forces.held[0]))
 
     def slip(self, operation: int) -> None:
         """What is in the hand moves along the pads, if the robot's errors state it; nothing else knows of it."""
@@ -270,7 +278,7 @@ class Robot:
             return [(0, n)]
         held = self.forces.held
         moving = moving_with_tip(self.scene, self.data, self.tip(), self.opening(), held)
-        spans = near_spans(self.scene, self.data, moving, held, line, s)
+        spans = find_near_spans(self.scene, self.data, moving, held, line, s)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
     def _pass(self, seconds: float) -> None:
@@ -315,7 +323,7 @@ class Robot:
         model = self.model
         data = self.data
         if self.wrist is None and not self.forces.held:
-            with sensors_off(model):
+            with switch_sensors_off(model):
                 for command in commands[:-1]:
                     data.ctrl[:] = command
                     mujoco.mj_step(model, data)

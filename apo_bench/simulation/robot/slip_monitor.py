@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import InHand
+from apo_bench.assembly import SlipInHand
 from apo_bench.geometry import Array, pose
 
 
@@ -16,7 +16,7 @@ class GraspSlipMonitor(NamedTuple):
     carried: tuple[float, float] = (0.0, 0.0)
     moved: tuple[float, float] | None = None
     """By how much since then, [m] and [rad]; None of what was never held."""
-    finished: tuple[InHand, ...] = ()
+    finished: tuple[SlipInHand, ...] = ()
 
     def grasp(self, T: Array) -> "GraspSlipMonitor":
         """The fingers have closed; once more where the grip is changed."""
@@ -36,7 +36,7 @@ class GraspSlipMonitor(NamedTuple):
         """The transfer is over."""
         if self.moved is None:
             return GraspSlipMonitor(finished=self.finished)
-        return GraspSlipMonitor(finished=(*self.finished, InHand(operation, *self.carried, *self.moved)))
+        return GraspSlipMonitor(finished=(*self.finished, SlipInHand(operation, *self.carried, *self.moved)))
 
     def _since(self, T: Array) -> tuple[float, float]:
         """How far the point between the pads has moved along with the part, and how far the part has turned."""

@@ -48,7 +48,7 @@ def hand_load(kinematics: Kinematics, opening: float) -> Load:
     return Load(float(kinematics.model.body_subtreemass[mount]), center)
 
 
-def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...]:
+def compute_part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...]:
     """Parts by their files, each (4, 4) at its estimated pose in the hand."""
     loads = []
     for part, T in T_tip_part.items():
@@ -58,12 +58,12 @@ def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...
     return tuple(loads)
 
 
-def low_pass_part(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
+def compute_low_pass_gain(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
     """How much of a new reading goes into the filtered one."""
     return 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
 
 
-def filtered_noise(noise: FtNoise, part: float) -> FtNoise:
+def filter_noise(noise: FtNoise, part: float) -> FtNoise:
     """What a low pass leaves of the noise: y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
 
     Args:
@@ -100,7 +100,7 @@ class WristSensor:
         self._encoders = encoders
         self._sigma = np.repeat(noise, 3)
         self._rng = rng
-        self._part = low_pass_part(bandwidth_hz)
+        self._part = compute_low_pass_gain(bandwidth_hz)
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
         self._zero: Array = np.zeros(6)
         data, T_tip = open_hand(scene.kinematics, scene.arm.opening_m)
@@ -119,10 +119,10 @@ class WristSensor:
     @property
     def sigma(self) -> tuple[float, float]:
         """Standard deviation behind the low pass, per axis, [N] and [Nm]."""
-        return filtered_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
+        return filter_noise(FtNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:
-        """Set what is in the hand, or nothing, by its estimate (`part_loads`), whose weight is subtracted."""
+        """Set what is in the hand, or nothing, by its estimate (`compute_part_loads`), whose weight is subtracted."""
         self._held = parts
         T = pose.inverse(self._T_tip_sensor)
         loads = (self._hand, *parts)

@@ -13,7 +13,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, all_boxes
 from apo_bench.mjcf.part_file import PartModel, add_picture
 from apo_bench.resources import folder
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario import Scenario, place_layout
 from apo_bench.scenario.parts import PartFile, read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.loading import load_model
@@ -65,7 +65,7 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
 def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
     """Where the robot replays: a room with parts, the arm, sensors of force, and welds where it grasps by them.
 
-    Last come the sensors of the wrist, which stay off until a replay needs them (`wrist_sensors_on`).
+    Last come the sensors of the wrist, which stay off until a replay needs them (`switch_wrist_sensors_on`).
 
     Args:
         first_link: The first body of the arm that moves.
@@ -92,7 +92,7 @@ def room_with_parts(scenario: Scenario, clearance_mm: float, settings: Physics) 
         spec.memory = _MEMORY
         spec.option.ccd_tolerance = _NEAREST_M
     set_options(spec.option, settings)
-    start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
+    start = place_layout(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
     files = {path: read_part(path) for path in dict.fromkeys(scenario.part_files.values())}
     bits = meetings(scenario.assembly.solids, clearance_mm * 1e-3)
     for part in scenario.assembly.solids:

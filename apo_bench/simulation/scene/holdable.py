@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import all_boxes, held_span
+from apo_bench.geometry import all_boxes, measure_held_span
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY
@@ -27,7 +27,7 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
         solid = scenario.assembly.solids[operation.main]
         up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
-        span = held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
+        span = measure_held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
         if span is None and not all_boxes(solid.pieces):
             at = ", ".join(f"{1e3 * x:g}" for x in grasp.point)
             raise InputError(

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from apo_bench.geometry import Array, Hull, first_of_each, remembered
+from apo_bench.geometry import Array, Hull, find_distinct_directions, remember
 
 ON_M = 1e-7  # planes that are nearer are one
 PARALLEL = 1e-7  # if their normals differ by no more
@@ -30,7 +30,7 @@ def enclose(a: Hull, b: Hull) -> Hull:
     return _hull_of(a.name, np.concatenate([a.corners, b.corners]))
 
 
-@remembered
+@remember
 def volume(hull: Hull) -> float:
     """[m^3]."""
     from scipy.spatial import ConvexHull
@@ -106,7 +106,7 @@ def _hull_of(name: str, points: Array) -> Hull:
 
     # Qhull divides sides into triangles: of each plane one is kept, and a corner is where three of these meet.
     hull = ConvexHull(points)
-    sides = hull.equations[first_of_each(hull.equations[:, :3], signed=True)]
+    sides = hull.equations[find_distinct_directions(hull.equations[:, :3], signed=True)]
     corners = points[hull.vertices]
     on = np.abs(corners @ sides[:, :3].T + sides[:, 3]) < 1e-9
     kept = corners[on.sum(axis=1) >= 3]

@@ -132,7 +132,7 @@ def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: 
     scene.ngeom += 1
 
 
-def pixels(points: Array, camera: Any, fovy_deg: float, width: int, height: int) -> Array:
+def project_to_pixels(points: Array, camera: Any, fovy_deg: float, width: int, height: int) -> Array:
     """Where points of the world, (k, 3), are in a picture by a free camera, (k, 2), from the upper left corner."""
     a = np.radians(camera.azimuth)
     e = np.radians(camera.elevation)

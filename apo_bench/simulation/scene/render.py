@@ -17,7 +17,7 @@ from apo_bench.geometry import Array
 from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, initial_state, set_part_pose
+from apo_bench.simulation.scene.world import World, make_initial_state, set_part_pose
 
 _Image = NDArray[np.uint8]
 SceneCamera: TypeAlias = str | mujoco.MjvCamera
@@ -34,11 +34,15 @@ def draw_picture(
     camera: SceneCamera = "overview",
     more: Callable[[Any], None] | None = None,
 ) -> _Image:
-    """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
+    """Return an image of the parts at given poses, without the arm, (height, width, 3), uint8.
 
     Args:
+        scene: From `build_scene`.
+        poses: Part -> its pose, (4, 4), world frame, [m]; a part that is not named is drawn at its start.
+        width: [pixels].
+        height: [pixels].
         camera: `overview`, `close`, `top`, or the result of `aim_camera`.
-        more: Draws more into MuJoCo's abstract scene, such as `Marks`.
+        more: A function that adds geoms to MuJoCo's abstract scene.
     """
     return _draw(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
 
@@ -58,13 +62,13 @@ def picture_with_arm(
         state: `qpos` of a replay, which is then shown as it is; of `poses` only those of fixed parts count.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
-    return _draw(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)
+    return _draw(scene.work, build_data_with_arm(scene, poses, state), width, height, camera, more)
 
 
-def data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
+def build_data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
     """What `picture_with_arm` shows, as `mujoco.MjData` of the scene where the robot works."""
     data = _at(scene.work, scene, poses)
-    arm_home(scene, data)
+    move_arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)
@@ -84,7 +88,7 @@ def place_for_picture(model: Any, data: Any) -> None:
     mujoco.mj_camlight(model, data)
 
 
-def arm_home(scene: Scene, data: Any) -> None:
+def move_arm_home(scene: Scene, data: Any) -> None:
     """Put the arm at home in a state of its world, its fingers open."""
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
         data.joint(f"arm/{joint}").qpos = q
@@ -96,7 +100,19 @@ def arm_home(scene: Scene, data: Any) -> None:
 def aim_camera(
     look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
 ) -> SceneCamera:
-    """A camera that looks at a point of the world, (3,), [m]."""
+    """Return a camera for `draw_picture`, `show_scenario` or `Film`.
+
+    Args:
+        look_at: The point in the middle of the picture, (3,), world frame, [m].
+        distance_m: Distance of the camera from that point.
+        azimuth_deg: Direction of the view about the vertical; 0 is along x of the world.
+        elevation_deg: Direction of the view against the horizontal; negative looks down.
+
+    Examples:
+        >>> import apo_bench, numpy as np
+        >>> apo_bench.aim_camera(np.array([0, 0, 0.05]), distance_m=0.3).distance
+        0.3
+    """
     camera = mujoco.MjvCamera()
     camera.lookat[:] = look_at
     camera.distance = distance_m
@@ -107,7 +123,10 @@ def aim_camera(
 
 @check_arguments
 class Film:
-    """Takes pictures of a replay: pass it as `watch`."""
+    """Film a replay: pass it as `watch` to `replay`, `demonstrate` or `run_trial`, then `save` it.
+
+    The attribute `frames` is a list of images, (height, width, 3), uint8.
+    """
 
     def __init__(
         self,
@@ -119,11 +138,16 @@ class Film:
         speed: float = 2.0,
         shadows: bool = False,
     ) -> None:
-        """A film to be shown at `fps` pictures a second, `speed` times as fast as the replay was.
+        """Make a film without frames.
 
         Args:
-            camera: By default one that looks at the middle of the assembly.
-            shadows: Nicer, and some times slower to draw without a graphics card.
+            scene: From `build_scene`.
+            fps: Frames per second of the film.
+            width: [pixels].
+            height: [pixels].
+            camera: As in `draw_picture`. Default: a camera that looks at the middle of the assembly.
+            speed: Simulated seconds per second of film.
+            shadows: Whether to draw shadows, which is several times slower without a graphics card.
         """
         middle = np.array([*scene.scenario.site.center_m, 0.08])
         self.fps = fps
@@ -142,21 +166,24 @@ class Film:
             self._next = data.time + self._every - 1e-9
 
     def shot(self, data: Any) -> _Image:
-        """One picture of the present state, not kept."""
+        """Return an image of a state (`mujoco.MjData`), (height, width, 3), uint8, without keeping it."""
         self._renderer.update_scene(data, camera=self.camera)
         return np.array(self._renderer.render())
 
     @check_arguments
     def save(self, path: str | Path) -> None:
-        """Write the film, by its ending as MP4 or GIF.
+        """Write the film.
+
+        Args:
+            path: A file that ends in .gif, or in .mp4 (extra `film`).
 
         Raises:
-            InputError: Another ending.
+            InputError: Another ending, or the extra is not installed.
         """
         save_film(self.frames, path, self.fps)
 
     def close(self) -> None:
-        """Give the renderer back; done by itself when the film is no longer used."""
+        """Free the renderer; this also happens when the film is deleted."""
         self._close()
 
 
@@ -243,7 +270,7 @@ def _check_camera(world: World, camera: SceneCamera) -> None:
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
-    data = initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
+    data = make_initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
         set_part_pose(world, data, part, poses.get(part, scene.scenario.start[part]))
     data.mocap_pos[:, 2] = -1.0

@@ -7,7 +7,7 @@ from typing import Any, Literal, final
 import mujoco
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Piece, physical_pieces
+from apo_bench.geometry import Piece, shrink_pieces
 from apo_bench.records import Criteria, check
 from apo_bench.scenario import Scenario, check_clearance
 from apo_bench.simulation.arms.arm import Arm
@@ -28,24 +28,30 @@ end within 2 micrometres of where they would."""
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything compiled: reusable for any number of trials, which leave nothing behind in it."""
+    """The compiled MuJoCo models of a scenario; any number of trials can use one scene."""
 
     scenario: Scenario
+    """The scenario that was compiled."""
     clearance_mm: float
+    """Clearance per side of parts that fit."""
     grasp: _Grasp
+    """`friction` or `weld`."""
     arm: Arm
+    """The robot arm with its gripper."""
     physics: Physics
+    """Time step and solver settings."""
     pieces: Mapping[str, tuple[Piece, ...]]
-    """Part -> its pieces as it is made, with clearance."""
+    """Part -> its convex pieces, with clearance."""
     shown: World
-    """Parts and hands: where the human demonstrates."""
+    """The model in which the human demonstrates: parts and hands."""
     work: World
-    """Parts and arm: where the robot replays."""
+    """The model in which the robot replays: parts and arm."""
     kinematics: Kinematics
+    """Inverse kinematics of the arm."""
 
     @property
     def criteria(self) -> Criteria:
-        """What the judge decides by."""
+        """The thresholds and the rule by which the judge decides."""
         return Criteria(self.scenario.thresholds, self.clearance_mm, self.scenario.success_means)
 
 
@@ -58,11 +64,27 @@ def build_scene(
     arm: str | Arm = "six_axis",
     timestep_s: float = 0.001,
 ) -> Scene:
-    """Compile a scenario.
+    """Compile a scenario to MuJoCo models.
+
+    Args:
+        scenario: From `load_scenario`.
+        clearance_mm: Clearance per side of parts that fit. Default: that of the scenario.
+        grasp: `friction`, or `weld` for an ideal gripper.
+        arm: A name (`apo-bench arm list`), an arm file, or an `Arm`.
+        timestep_s: Time step of the physics: 0.001, or 0.0005 to check.
+
+    Returns:
+        A scene for `demonstrate`, `replay` and pictures.
 
     Raises:
-        InputError: Unknown grasp or arm, a clearance that a part cannot have or that leaves a shaft no play, an
-            unchecked time step, a part that the gripper cannot hold.
+        InputError: Unknown grasp or arm, a clearance that a part cannot have or that leaves a shaft no play, a time
+            step other than these, a part that the gripper cannot hold.
+
+    Examples:
+        >>> import apo_bench
+        >>> scene = apo_bench.build_scene(apo_bench.load_scenario("block_on_block"), clearance_mm=0.1)
+        >>> scene.criteria.clearance_mm
+        0.1
     """
     check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
@@ -83,7 +105,7 @@ def build_scene(
         grasp="weld" if grasp == "weld" else "friction",
         arm=robot,
         physics=settings,
-        pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
+        pieces={name: shrink_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,
         work=work,
         kinematics=kinematics,

@@ -16,11 +16,11 @@ import mujoco
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation
-from apo_bench.geometry import Array, Solid, physical_pieces, pose
-from apo_bench.records import sentence
+from apo_bench.geometry import Array, Solid, pose, shrink_pieces
+from apo_bench.records import describe_outcome
 from apo_bench.simulation.physics import Physics, physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import add_pieces, set_mass
-from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, set_part_pose, world
+from apo_bench.simulation.scene.world import World, get_part_pose, has_failed, make_initial_state, set_part_pose, world
 
 LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned."""
@@ -47,12 +47,14 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
     """
     if not observation.observed.all():
         missing = int(np.argmin(observation.observed))
-        return Correction(observation.poses, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
+        return Correction(
+            observation.poses, "not_seen", describe_outcome("not_seen", operation=missing), (), np.nan, np.nan, 0
+        )
     goals = np.array(observation.poses)
     if not len(goals):
         return goals
     scene = _world(observation)
-    data = initial_state(scene, observation.start)
+    data = make_initial_state(scene, observation.start)
     for k, operation in enumerate(observation.assembly.operations):
         _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.poses[k])
         try:
@@ -61,15 +63,15 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
             break
         if has_failed(data):
             break
-        goals[k] = part_pose(scene, data, operation.main)
+        goals[k] = get_part_pose(scene, data, operation.main)
     return goals
 
 
 def _put(scene: World, data: mujoco.MjData, moves: tuple[str, ...], T: Array) -> None:
     """The main part at T, at rest, and what it carries along with it."""
-    before = pose.inverse(part_pose(scene, data, moves[0]))
+    before = pose.inverse(get_part_pose(scene, data, moves[0]))
     for part in moves:
-        set_part_pose(scene, data, part, T @ before @ part_pose(scene, data, part))
+        set_part_pose(scene, data, part, T @ before @ get_part_pose(scene, data, part))
 
 
 def _rest(scene: World, data: mujoco.MjData) -> None:
@@ -109,5 +111,5 @@ def _room(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float
         if part in free:
             body.add_freejoint()
         set_mass(body, solid, _DENSITY)
-        add_pieces(spec, body, physical_pieces(solid, clearance_m), surface, f"{part}/")
+        add_pieces(spec, body, shrink_pieces(solid, clearance_m), surface, f"{part}/")
     return spec

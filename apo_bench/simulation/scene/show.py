@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.assembly import placements
-from apo_bench.scenario import Scenario, layout_at, load_scenario
+from apo_bench.assembly import compute_placements
+from apo_bench.scenario import Scenario, load_scenario, place_layout
 from apo_bench.simulation.scene.render import SceneCamera, draw_picture
 from apo_bench.simulation.scene.scene import build_scene
 
@@ -16,15 +16,15 @@ from apo_bench.simulation.scene.scene import build_scene
 def show_scenario(
     scenario: str | Path | Scenario, *, finished: bool = True, camera: SceneCamera = "close"
 ) -> NDArray[np.uint8]:
-    """An image of a scenario without the arm, (480, 640, 3).
+    """Return an image of a scenario without the arm, (480, 640, 3), uint8.
 
     Args:
         scenario: A name, the path of a scenario file, or the scenario itself.
-        finished: Whether the parts are assembled at their nominal poses; if not, they are at their starts.
+        finished: Show the parts assembled at their nominal poses; if false, at their starts.
         camera: As in `draw_picture`.
     """
     loaded = load_scenario(scenario)
     x, y = loaded.site.center_m
-    layout = layout_at(loaded, x, y, float(np.mean(loaded.site.yaw_rad)))
-    poses = placements(loaded.assembly, layout.start, layout.poses)[-1] if finished else layout.start
+    layout = place_layout(loaded, x, y, float(np.mean(loaded.site.yaw_rad)))
+    poses = compute_placements(loaded.assembly, layout.start, layout.poses)[-1] if finished else layout.start
     return draw_picture(build_scene(loaded), poses, camera=camera)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import SAGITTA_M, Array, Hull, Piece, RoundFace, Solid, physical_pieces, remembered
+from apo_bench.geometry import SAGITTA_M, Array, Hull, Piece, RoundFace, Solid, remember, shrink_pieces
 from apo_bench.simulation.scene.hulls import (
     ON_M,
     PARALLEL,
@@ -51,20 +51,20 @@ class _Wall(NamedTuple):
     """The cut is so far from the axis."""
 
 
-@remembered
+@remember
 def linings(solid: Solid, clearance_m: float) -> Mapping[str, float]:
     """Name of a wall that has something behind it -> how far from the axis of its hole that is, [m]."""
     walls = [wall for group in _groups(solid, clearance_m) for wall in group]
     return {wall.hull.name: wall.behind_m for wall in walls if _reaches_beyond(wall)}
 
 
-@remembered
+@remember
 def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
     """The pieces of a part as they are simulated, by the name of the piece that they are cut from, if any is left.
 
     Remembered, since copies of a part, and the worlds of hands and of the arm, have the same.
     """
-    pieces = physical_pieces(solid, clearance_m)
+    pieces = shrink_pieces(solid, clearance_m)
     nothing: Mapping[str, tuple[Piece, ...]] = {piece.name: () for piece in solid.pieces}
     if not any(face.hole and face.kind != "rim" for face in solid.rounds.values()):
         return {**nothing, **{piece.name: (piece,) for piece in pieces}}
@@ -92,11 +92,11 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
     return cut
 
 
-@remembered
+@remember
 def _groups(solid: Solid, clearance_m: float) -> list[list[_Wall]]:
     """The walls of all holes, those with the same cut together; each wedge is the wall of one hole."""
     groups: list[list[_Wall]] = []
-    left = list(physical_pieces(solid, clearance_m))
+    left = list(shrink_pieces(solid, clearance_m))
     for face in solid.rounds.values():
         if face.hole and face.kind != "rim":
             walls = list(_walls(face, left, clearance_m))

@@ -65,7 +65,7 @@ def set_part_pose(world: World, data: Any, part: str, T: Array) -> None:
     data.qvel[v : v + 6] = 0.0
 
 
-def initial_state(world: World, start: Poses) -> Any:
+def make_initial_state(world: World, start: Poses) -> Any:
     """New `MjData` with every movable part at its start and every fixed part at its place."""
     for part in world.fixed:
         body = world.body[part]
@@ -78,7 +78,7 @@ def initial_state(world: World, start: Poses) -> Any:
     return data
 
 
-def part_pose(world: World, data: Any, part: str) -> Array:
+def get_part_pose(world: World, data: Any, part: str) -> Array:
     """The pose of a movable part, (4, 4), straight from its joint."""
     a = world.qpos[part]
     return frame(rotation(data.qpos[a + 3 : a + 7]), data.qpos[a : a + 3])
@@ -100,18 +100,18 @@ def allow_sleep(world: World, allowed: bool) -> AbstractContextManager[None]:
     return _with_option(world.model, "enableflags", flags | SLEEP if allowed else flags & ~SLEEP)
 
 
-def timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
+def use_timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
     """Take steps of another length for a while."""
     return _with_option(model, "timestep", seconds)
 
 
-def sensors_off(model: Any) -> AbstractContextManager[None]:
+def switch_sensors_off(model: Any) -> AbstractContextManager[None]:
     """Switch all sensors off for a while."""
     return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
 
 
 @contextmanager
-def wrist_sensors_on(model: Any) -> Iterator[None]:
+def switch_wrist_sensors_on(model: Any) -> Iterator[None]:
     """Compute the sensors of the wrist for a while, and what only they need."""
     sensors = [model.sensor(name).id for name in WRIST_SENSORS]
     before = model.sensor_needstage[sensors]
@@ -123,7 +123,7 @@ def wrist_sensors_on(model: Any) -> Iterator[None]:
 
 
 def disable_wrist_sensors(model: Any) -> None:
-    """Compute the sensors of the wrist in `wrist_sensors_on` only: they make a step a twentieth longer."""
+    """Compute the sensors of the wrist in `switch_wrist_sensors_on` only: they make a step a twentieth longer."""
     model.sensor_needstage[[model.sensor(name).id for name in WRIST_SENSORS]] = _NEVER
 
 
@@ -144,10 +144,10 @@ def wake(world: World, data: Any) -> None:
         mujoco.mj_fwdPosition(world.model, data)
 
 
-def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
+def take_snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     """What the judge may see of the present state."""
     wake(world, data)
-    poses = {part: part_pose(world, data, part) for part in world.free}
+    poses = {part: get_part_pose(world, data, part) for part in world.free}
     poses.update({part: start[part] for part in world.fixed})
     a, b = _contact_parts(world, data)
     between = (a >= 0) & (b >= 0) & (a != b)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, Solid, physical_pieces
+from apo_bench.geometry import Array, Solid, shrink_pieces
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
@@ -83,7 +83,7 @@ class ModelRays:
         spec = mujoco.MjSpec()
         for part, solid in solids.items():
             body = spec.worldbody.add_body(name=part, mocap=True)
-            add_pieces(spec, body, physical_pieces(solid, play_m), {}, f"{part}/")
+            add_pieces(spec, body, shrink_pieces(solid, play_m), {}, f"{part}/")
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         bodies = [self._model.body(part) for part in solids]

@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
-from apo_bench.records import sentence
+from apo_bench.records import describe_outcome
 from apo_bench.simulation.execution import (
     Execution,
     ExecutionConfig,
@@ -20,12 +20,20 @@ from apo_bench.simulation.execution import (
     ReplayCache,
     SavedState,
     Transfer,
-    before_attach,
+    carry_to_attach,
     restore_state,
     save_state,
 )
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot import ExecutionAborted, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
+from apo_bench.simulation.robot import (
+    ExecutionAborted,
+    Robot,
+    RobotError,
+    WristSensor,
+    compute_part_loads,
+    get_wrist,
+    zero,
+)
 from apo_bench.simulation.scene import Scene, allow_sleep
 
 
@@ -107,12 +115,14 @@ def _hold(execution: Execution, move: Move, sensor: tuple[str, tuple[int, ...]])
     try:
         with robot.watch_stability():
             i = execution.pick(t, k)
-            grip, second = before_attach(robot, t, i, execution.laying(t, k))
-            wrist = wrist_of(robot, sensor[0], np.random.default_rng(sensor[1]))
-            wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
+            grip, second = carry_to_attach(robot, t, i, execution.laying(t, k))
+            wrist = get_wrist(robot, sensor[0], np.random.default_rng(sensor[1]))
+            wrist.hold(*compute_part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
             zero(robot, wrist)
     except ExecutionAborted as aborted:
-        return Outcome(aborted.stage, aborted.code, k, sentence(aborted.code, part=aborted.part or t.part, operation=k))
+        return Outcome(
+            aborted.stage, aborted.code, k, describe_outcome(aborted.code, part=aborted.part or t.part, operation=k)
+        )
     left = execution.residual
     return Start(
         operation=k,

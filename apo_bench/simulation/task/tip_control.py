@@ -14,18 +14,18 @@ import numpy as np
 from apo_bench.assembly import Poses, Snapshot
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution import (
-    after_attach,
     check_hold,
+    choose_pace,
     depart,
-    end_of_attach,
-    pace,
+    find_attach_end,
+    finish_attach,
     release,
     restore_state,
     wait_for_rest,
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, translate
-from apo_bench.simulation.scene import Scene, allow_sleep, part_pose, snapshot, wrist_sensors_on
+from apo_bench.simulation.scene import Scene, allow_sleep, get_part_pose, switch_wrist_sensors_on, take_snapshot
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -86,10 +86,10 @@ class TipControl:
         robot.stage, robot.macro = "attach", "insert"
         t = start.transfer
         self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
-        self._end = end_of_attach(t, start.grip, start.second)
+        self._end = find_attach_end(t, start.grip, start.second)
         self._front = pose.apply(pose.inverse(start.grip.T_part_tip), t.foremost[None])[0]
         self._R = frame_of_direction(t.into.direction, self._end)
-        self._pace = pace(t, start.second)
+        self._pace = choose_pace(t, start.second)
         self._guard = t.insert_n if t.into.level else t.place_n
         self._left = 0.0 if start.second is None else float(t.into.left or 0.0)
         self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
@@ -134,12 +134,12 @@ class TipControl:
             robot.stand()
             if self.arrived:
                 at_end = translate(robot.T, t.into.direction, -float(self._off(robot.T)[2]))
-                after_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
+                finish_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
             else:
                 release(robot, t, self.start.grip)
                 depart(robot, t)
             wait_for_rest(robot)
-            return snapshot(work, robot.data, self.start.parts)
+            return take_snapshot(work, robot.data, self.start.parts)
 
     def sigmas(self, covariance: Array) -> Array:
         """Standard deviations in the frame of the way in, of the front and of the turn, (6,), [m, rad].
@@ -159,7 +159,7 @@ class TipControl:
         The mean, in the frame of the way in; the third number is less than 0 before the end. For observers, as `poses`.
         """
         t = self.start.transfer
-        T = part_pose(self.robot.scene.work, self.robot.data, t.part)
+        T = get_part_pose(self.robot.scene.work, self.robot.data, t.part)
         front = t.foremost[None]
         found = []
         for goal in goals:
@@ -173,7 +173,7 @@ class TipControl:
     def poses(self) -> Poses:
         """Where all parts are, (4, 4) each, world: for observers; nothing is decided by it."""
         work = self.robot.scene.work
-        return {**self.start.parts, **{part: part_pose(work, self.robot.data, part) for part in work.free}}
+        return {**self.start.parts, **{part: get_part_pose(work, self.robot.data, part) for part in work.free}}
 
     @property
     def force_n(self) -> float:
@@ -185,7 +185,7 @@ class TipControl:
         robot = self.robot
         work = robot.scene.work
         asleep = allow_sleep(work, robot.scene.grasp == "friction")
-        with asleep, wrist_sensors_on(work.model), robot.watch_stability():
+        with asleep, switch_wrist_sensors_on(work.model), robot.watch_stability():
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:

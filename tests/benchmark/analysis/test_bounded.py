@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.emplike.descriptive import DescStat
 
-from apo_bench.benchmark.analysis import mean_surprise, threshold
+from apo_bench.benchmark.analysis import compute_mean_surprise, compute_threshold
 from apo_bench.benchmark.analysis.over_seeds import mean_interval
 
 STEPS = st.lists(st.integers(0, 20), min_size=2, max_size=40)
@@ -22,7 +22,7 @@ def test_of_zeros_and_ones_it_is_the_binomial_likelihood(k: int, n: int, p: floa
     def part(count: int, rate: float) -> float:
         return count * math.log(count / n / rate) if count else 0.0
 
-    found = float(mean_surprise(np.array([0.0, 1.0]), np.array([n - k, k]), p))
+    found = float(compute_mean_surprise(np.array([0.0, 1.0]), np.array([n - k, k]), p))
     assert found == pytest.approx(2 * (part(k, p) + part(n - k, 1 - p)), rel=1e-6)
 
 
@@ -31,22 +31,22 @@ def test_of_zeros_and_ones_it_is_the_binomial_likelihood(k: int, n: int, p: floa
 def test_between_the_values_it_is_owens_empirical_likelihood(mean: float) -> None:
     x = np.random.default_rng(4).beta(2.0, 2.0, 30)
     expected = DescStat(x).test_mean(mean)[0]
-    assert float(mean_surprise(x, np.ones_like(x), mean)) == pytest.approx(expected, rel=1e-6)
+    assert float(compute_mean_surprise(x, np.ones_like(x), mean)) == pytest.approx(expected, rel=1e-6)
 
 
 def test_few_seeds_are_held_against_students_t() -> None:
     from scipy.stats import t
 
-    assert threshold(8) == pytest.approx(t.ppf(0.975, 7) ** 2)
-    assert threshold(100_000) == pytest.approx(3.8415, abs=1e-3)
-    assert threshold(1) == threshold(0) == math.inf
+    assert compute_threshold(8) == pytest.approx(t.ppf(0.975, 7) ** 2)
+    assert compute_threshold(100_000) == pytest.approx(3.8415, abs=1e-3)
+    assert compute_threshold(1) == compute_threshold(0) == math.inf
 
 
 def test_without_spread_there_is_an_interval_and_without_seeds_nothing_is_known() -> None:
     assert mean_interval(np.array([])) == (0.0, 1.0)
     assert mean_interval(np.array([0.4])) == pytest.approx((0.0, 1.0), abs=1e-6)
     low, high = mean_interval(np.ones(100))
-    assert (low, high) == pytest.approx((math.exp(-threshold(100) / 200), 1.0), abs=1e-6)
+    assert (low, high) == pytest.approx((math.exp(-compute_threshold(100) / 200), 1.0), abs=1e-6)
     low, high = mean_interval(np.zeros(50), -1.0, 1.0)
     assert low == pytest.approx(-high)
     assert 0.0 < high < 0.05

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from apo_bench import InputError
-from apo_bench.benchmark.analysis import calibrations
+from apo_bench.benchmark.analysis import tabulate_calibration
 from apo_bench.benchmark.report.tables.methods import calibration_table
 from apo_bench.records import RECORD_FIELDS
 from apo_bench.records.run.run_folder import read_records
@@ -44,7 +44,7 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
         ),
         corrected(3, False, ("R3",), **wrong | {"contact_source": "false-negative", "wrong_contact": None}),
     ]
-    raw, right, missed, shifted = calibrations(rows)
+    raw, right, missed, shifted = tabulate_calibration(rows)
     assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == [
         "uncorrected",
         (0, 0),

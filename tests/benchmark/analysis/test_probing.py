@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench.benchmark.analysis import members, probing_results, settings, tally
+from apo_bench.benchmark.analysis import group_by_setting, list_settings, tabulate_probing, tally
 from apo_bench.benchmark.analysis.paired import reference_condition
 from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import probing_table
@@ -26,7 +26,7 @@ def probe(seed: int, mm: float, method: str = "contact+probe", **more: Any) -> d
 
 
 def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> None:
-    (found,) = probing_results([probe(0, 0.3), probe(1, 0.4), row("contact")])
+    (found,) = tabulate_probing([probe(0, 0.3), probe(1, 0.4), row("contact")])
     assert (found["trials"], found["probe_contacts"], found["rejected"]) == (2, 6.5, 1)
     assert found["estimated_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
     assert (found["std_mm"], found["std_deg"]) == pytest.approx((0.2, 0.05))
@@ -36,7 +36,7 @@ def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> 
 
 @pytest.mark.parametrize(("stated", "told"), [("unknown", None), ("tool:1", (0.0, 0.0)), ("matched", (0.866, 0.173))])
 def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
-    (found,) = probing_results([probe(0, 0.3, assumed_robot_error=stated)])
+    (found,) = tabulate_probing([probe(0, 0.3, assumed_robot_error=stated)])
     said = (found["assumed_mm"], found["assumed_deg"])
     assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
     (line,) = probing_table((found,)).lines
@@ -46,7 +46,7 @@ def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: t
 
 
 def test_where_no_robot_felt_one_sentence_says_so() -> None:
-    assert probing_table(probing_results([row("contact")])).markdown() == ["No robot probed."]
+    assert probing_table(tabulate_probing([row("contact")])).markdown() == ["No robot probed."]
 
 
 def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None:
@@ -58,7 +58,7 @@ def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None
         ("contact+probe", "wrist"),
         ("contact+probe", "joint-torque"),
     ]
-    groups = members(settings(cells), cells)
+    groups = group_by_setting(list_settings(cells), cells)
     assert sorted((s.ft_sensor, tuple(cell.method for cell in own)) for s, own in groups.items()) == [
         ("joint-torque", ("contact", "contact+probe")),
         ("wrist", ("contact", "contact+probe")),

@@ -14,8 +14,16 @@ from hypothesis import strategies as st
 from statsmodels.stats.proportion import proportion_confint
 
 from apo_bench import InputError
-from apo_bench.benchmark.analysis import Rate, confusions, efforts, members, summary, tally, wilson
-from apo_bench.benchmark.analysis import settings as settings_of_cells
+from apo_bench.benchmark.analysis import (
+    Rate,
+    compute_wilson_interval,
+    group_by_setting,
+    summarise,
+    tabulate_confusion,
+    tabulate_effort,
+    tally,
+)
+from apo_bench.benchmark.analysis import list_settings as settings_of_cells
 from apo_bench.benchmark.report.report import report
 from apo_bench.benchmark.report.tables.conditions import condition_table
 from apo_bench.benchmark.report.tables.methods import prediction_summary
@@ -94,8 +102,10 @@ def write(folder: Path, rows: list[dict[str, Any]]) -> Path:
 def test_wilson_published_examples(successes: int, trials: int, expected: tuple[float, float]) -> None:
     """Table I, method 3, of R. G. Newcombe, Two-sided confidence intervals for the single proportion, Statistics in
     Medicine 17 (1998), 857-872."""
-    assert wilson(successes, trials) == pytest.approx(expected, abs=5e-5)
-    assert wilson(successes, trials) == pytest.approx(proportion_confint(successes, trials, method="wilson"), abs=1e-12)
+    assert compute_wilson_interval(successes, trials) == pytest.approx(expected, abs=5e-5)
+    assert compute_wilson_interval(successes, trials) == pytest.approx(
+        proportion_confint(successes, trials, method="wilson"), abs=1e-12
+    )
 
 
 def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
@@ -105,7 +115,7 @@ def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
     (cell,) = tally([*rows, row(seed=9, success=None)])
     assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 3, 4, 1)
     assert (cell.rate, cell.executed, cell.wrong_when_executed) == (0.375, (3, 4), 0.25)
-    assert cell.executed.interval == wilson(3, 4)
+    assert cell.executed.interval == compute_wilson_interval(3, 4)
     assert Rate(0, 0).rate is None
 
 
@@ -129,7 +139,7 @@ def test_rows_are_counted_into_cells() -> None:
     assert (raw.trials, raw.successes, raw.loose_successes, raw.excluded) == (4, 1, 2, 1)
     assert list(raw.failures.items()) == [("attach: force_stop", 2), ("judge: gap", 1)]
     assert raw.rate == 0.25
-    assert raw.interval == wilson(1, 4)
+    assert raw.interval == compute_wilson_interval(1, 4)
 
 
 def test_predictions_are_counted_against_physics() -> None:
@@ -148,7 +158,7 @@ def test_predictions_are_counted_against_physics() -> None:
         row("oracle", seed=0),
         row(seed=0, scenario="stick_on_castles", noise_mm=None, noise_deg=None, human_error_scale=None),
     ]
-    ceiling, raw, measured, everything = confusions(rows)
+    ceiling, raw, measured, everything = tabulate_confusion(rows)
     assert list(raw.values()) == ["stick_in_tower", "uncorrected", 6, 4, 1, 1, 1, 3, 4 / 6, 1, 2, 2, 1]
     assert (ceiling["method"], ceiling["agreement"], measured["scenario"]) == ("oracle", 1.0, "stick_on_castles")
     assert (everything["scenario"], everything["method"], everything["executed"]) == ("all", "all", 8)
@@ -186,7 +196,7 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
         *(("uncorrected", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
-    assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
+    assert math.isclose(float(table[1]["low_95"]), compute_wilson_interval(1, 4).low)
     (figure,) = [path for path in made.figures if path.name == "success_over_noise_level.png"]
     assert figure.read_bytes().startswith(b"\x89PNG")
     page = pages.lines(made.page)
@@ -222,7 +232,7 @@ def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: P
     """A reference that cannot look is that of every number of looks."""
     rows = [row("contact", seed=i, success=i < 1) for i in range(4)]
     rows += [row("contact-robust", seed=i, success=i < n, max_reobservations=n) for n in (0, 2, 4) for i in range(4)]
-    found = summary(rows, ("contact",))
+    found = summarise(rows, ("contact",))
     assert [(c.method, c.max_reobservations, c.successes) for c in found.results] == [
         *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
     ]
@@ -231,7 +241,7 @@ def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: P
         (2, 1, 0),
         (4, 3, 0),
     ]
-    grouped = members(settings_of_cells(found.results), found.results)
+    grouped = group_by_setting(settings_of_cells(found.results), found.results)
     assert [(s.max_reobservations, [c.method for c in own]) for s, own in grouped.items()] == [
         (n, ["contact", "contact-robust"]) for n in (0, 2, 4)
     ]
@@ -265,11 +275,11 @@ def test_effort_counts_what_was_right() -> None:
         row("paper-track", 2, success=False, extra_steps=9, sim_time_s=99.0, displaced_mm=9.0),
         row("uncorrected", 0, success=False),
     ]
-    assert [list(line.values()) for line in efforts(rows)] == [
+    assert [list(line.values()) for line in tabulate_effort(rows)] == [
         ["stick_in_tower", "paper", 1, 0.0, 20.0, 0.1],
         ["stick_in_tower", "paper-track", 2, 3.0, 27.0, 0.3],
     ]
-    assert efforts([]) == []
+    assert tabulate_effort([]) == []
 
 
 def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError
-from apo_bench.benchmark.analysis import summary
+from apo_bench.benchmark.analysis import summarise
 from tests.benchmark.analysis.test_rates import row
 
 METHODS = ("uncorrected", "paper", "contact")
@@ -30,7 +30,7 @@ def rows(seeds: int = 12, scenarios: int = 1) -> list[dict[str, Any]]:
 
 
 def test_it_holds_every_part() -> None:
-    found = summary(rows(40))
+    found = summarise(rows(40))
     assert len(found.results) == 12
     assert {(p.condition.method, p.reference) for p in found.pairs} == {
         ("uncorrected", "paper"), ("paper", "uncorrected"), ("contact", "uncorrected"), ("contact", "paper")
@@ -45,23 +45,23 @@ def test_it_holds_every_part() -> None:
 def test_the_order_of_rows_does_not_matter(order: Any) -> None:
     shuffled = rows()
     order.shuffle(shuffled)
-    assert summary(shuffled) == summary(rows())
+    assert summarise(shuffled) == summarise(rows())
 
 
 def test_other_references() -> None:
-    found = summary(rows(), references=("contact",))
+    found = summarise(rows(), references=("contact",))
     assert {p.reference for p in found.pairs} == {"contact"}
     with pytest.raises(InputError, match="twice"):
-        summary([*rows(), rows()[0]])
+        summarise([*rows(), rows()[0]])
 
 
 def test_without_rows_there_is_nothing() -> None:
-    assert summary([]).results == summary([]).pairs == summary([]).half_levels == ()
+    assert summarise([]).results == summarise([]).pairs == summarise([]).half_levels == ()
 
 
 def test_ten_thousand_rows_take_a_second_or_two() -> None:
     """A tenth of what a report must bear; the bound is wide, as machines are shared."""
     many = rows(100, scenarios=9)
     start = time.process_time()
-    summary(many)
+    summarise(many)
     assert time.process_time() - start < 5.0

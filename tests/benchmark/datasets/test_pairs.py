@@ -9,28 +9,28 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
-from apo_bench.assembly import Demonstration, Layout, contact_equations
-from apo_bench.benchmark.datasets import drawing, endless_pairs, pairs
+from apo_bench.assembly import Demonstration, Layout, build_contact_equations
+from apo_bench.benchmark.datasets import draw_endless_pairs, draw_pairs, drawing
 from apo_bench.benchmark.datasets.drawing import by_part, observe_many
 from apo_bench.benchmark.scoring.track import read_tracks
 from apo_bench.geometry import pose
-from apo_bench.perception.observation.models.symmetric import AnyTurn
+from apo_bench.perception.observation.models.symmetric import AnyTurnNoise
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
 from apo_bench.perception.observation.noise_file import presets
-from apo_bench.scenario import human_error_covariance, scenario_names, spread_error
+from apo_bench.scenario import compute_human_error_covariance, list_scenario_names, spread_error
 from apo_bench.scenario.layout import draw_layouts
 from apo_bench.trial.stages import stream
 
 SHARED = {"bias-view", "correlated", "swaps", "displaced-view"}
 """What is seen of one part hangs together with what is seen of another."""
-KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurn]
+KINDS = ["outliers", "bias", "flips", "megapose-lmo", AnyTurnNoise]
 """Of several independent draws: of each look, of each part, of a camera that fails, of a file, of a class."""
 
 
 def test_models_whose_parts_are_independent_are_drawn_together() -> None:
     assert {name for name in (*NOISES, *presets()) if not by_part(make_noise(name, NoiseLevel(1.0, 1.0)))} == SHARED
-    assert not pairs("stick_in_tower", "swaps", 3).together
-    assert pairs("stick_in_tower", "bias", 3).together
+    assert not draw_pairs("stick_in_tower", "swaps", 3).together
+    assert draw_pairs("stick_in_tower", "bias", 3).together
 
 
 @pytest.mark.parametrize("noise", [*KINDS, "correlated"])
@@ -39,7 +39,7 @@ def test_one_demonstration_is_seen_as_the_noise_model_sees_it(noise: str | type)
     scenario = load_scenario("carried_bridge")
     model = make_noise(noise, NoiseLevel(2.0, 1.0))
     layouts = draw_layouts(scenario, np.random.default_rng(1), 1)
-    human_error_scale = human_error_covariance(scenario, 1.0)
+    human_error_scale = compute_human_error_covariance(scenario, 1.0)
     many = observe_many(scenario.assembly, layouts, human_error_scale, model, np.random.default_rng(2))
     start = {part: poses[0] for part, poses in layouts.start.items()}
     one = model(
@@ -57,7 +57,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
     """Quartiles of shifts and turns, how often nothing is seen, and how alike two errors of one part are."""
 
     def drawn() -> np.ndarray:
-        many = pairs("carried_bridge", noise, 256, 4, noise_level=2.0, human_error_scale=0.0)
+        many = draw_pairs("carried_bridge", noise, 256, 4, noise_level=2.0, human_error_scale=0.0)
         xi = pose.log(pose.inverse(many.truth) @ many.goals)
         sizes = np.linalg.norm(xi.reshape(256, -1, 2, 3), axis=-1)
         quartiles = np.quantile(sizes[many.seen], [0.25, 0.5, 0.75], axis=0)
@@ -75,12 +75,12 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
 @pytest.mark.parametrize("name", ["pocket_table", "gearbox", "dovetail"])
 def test_every_contact_of_the_truth_holds(name: str) -> None:
     scenario = load_scenario(name)
-    layouts = draw_layouts(scenario, drawing.stream(0, name, 0), 2)
-    many = pairs(name, n=2)
+    layouts = draw_layouts(scenario, drawing.seed_block(0, name, 0), 2)
+    many = draw_pairs(name, n=2)
     np.testing.assert_array_equal(many.truth, layouts.goals)
     for i, goals in enumerate(many.truth):
         start = {part: poses[i] for part, poses in layouts.start.items()}
-        assert np.abs(contact_equations(scenario.assembly, start, goals).gaps(goals)).max() < 1e-9
+        assert np.abs(build_contact_equations(scenario.assembly, start, goals).gaps(goals)).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["vanished_fixture", "gearbox", "nested_bushings"])
@@ -88,9 +88,9 @@ def test_a_mistake_spreads_in_each_layout_as_in_a_demonstration(name: str) -> No
     """Without noise what is shown is seen, and its mistake is that of a trial of the same size."""
     scenario = load_scenario(name)
     assert scenario.human_error is not None
-    careful, human_error_scale = (pairs(name, n=2, noise_level=0.0, human_error_scale=c) for c in (0.0, 1.0))
+    careful, human_error_scale = (draw_pairs(name, n=2, noise_level=0.0, human_error_scale=c) for c in (0.0, 1.0))
     np.testing.assert_array_equal(careful.goals, careful.truth)
-    layouts = draw_layouts(scenario, drawing.stream(0, name, 0), 2)
+    layouts = draw_layouts(scenario, drawing.seed_block(0, name, 0), 2)
     for i in range(2):
         off = (pose.inverse(human_error_scale.truth[i]) @ human_error_scale.goals[i])[:, :3, 3]
         mine = off[scenario.human_error.operation]
@@ -100,25 +100,25 @@ def test_a_mistake_spreads_in_each_layout_as_in_a_demonstration(name: str) -> No
 
 
 def test_more_pairs_begin_with_the_same_ones() -> None:
-    few = pairs("dovetail", "outliers", 5, 7, noise_level=(1.0, 2.0))
-    many = pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, noise_level=(1.0, 2.0))
-    blocks = endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
+    few = draw_pairs("dovetail", "outliers", 5, 7, noise_level=(1.0, 2.0))
+    many = draw_pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, noise_level=(1.0, 2.0))
+    blocks = draw_endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
     first, second = next(blocks), next(blocks)
     for name in ("goals", "covariance", "seen", "truth"):
         np.testing.assert_array_equal(getattr(many, name)[:5], getattr(few, name))
         joined = np.concatenate([getattr(first, name), getattr(second, name)[:5]])
         np.testing.assert_array_equal(joined, getattr(many, name))
     assert not np.array_equal(first.truth, second.truth)
-    assert not np.array_equal(pairs("dovetail", n=5, seed=8).truth, few.truth)
+    assert not np.array_equal(draw_pairs("dovetail", n=5, seed=8).truth, few.truth)
 
 
 def test_several_scenarios_come_in_turn_each_as_alone() -> None:
     names = ("dovetail", "stick_in_tower")
-    both = pairs(names, n=7, seed=2)
+    both = draw_pairs(names, n=7, seed=2)
     assert (both.scenarios, both.scenario.tolist()) == (names, [0, 1, 0, 1, 0, 1, 0])
     assert both.operations.tolist() == [2, 3, 2, 3, 2, 3, 2]
     assert both.goals.shape == (7, 3, 4, 4)
-    alone = pairs("dovetail", n=4, seed=2)
+    alone = draw_pairs("dovetail", n=4, seed=2)
     np.testing.assert_array_equal(both.truth[::2, :2], alone.truth)
     np.testing.assert_array_equal(both.covariance[::2, :2], alone.covariance)
     assert not both.seen[::2, 2].any()
@@ -126,7 +126,7 @@ def test_several_scenarios_come_in_turn_each_as_alone() -> None:
 
 
 def test_it_is_a_data_set_with_a_length_and_an_index() -> None:
-    many = pairs("dovetail", n=5)
+    many = draw_pairs("dovetail", n=5)
     assert len(many) == 5
     one = many[3]
     assert {name: entry.shape for name, entry in one.items()} == {
@@ -150,9 +150,9 @@ def test_no_stream_of_chance_is_one_of_a_trial() -> None:
     most = max(grid.trials for track in read_tracks(()) for grid in track.grids)
     drawn = [stream(seed, which).random() for seed in range(max(most, 100)) for which in range(12)]
     ours = [
-        drawing.stream(seed, name, block).random()
+        drawing.seed_block(seed, name, block).random()
         for seed in range(20)
-        for name in scenario_names()
+        for name in list_scenario_names()
         for block in range(3)
     ]
     assert len({*drawn, *ours}) == len(drawn) + len(ours)
@@ -180,4 +180,4 @@ def test_neither_simulator_nor_torch_is_loaded() -> None:
 )
 def test_what_is_wrong_is_said(given: dict[str, object], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
-        pairs(**given)  # type: ignore[arg-type]
+        draw_pairs(**given)  # type: ignore[arg-type]

@@ -10,7 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.benchmark.analysis import FEWEST_SEEDS, Results, contrast, summary, tango, wilson
+from apo_bench.benchmark.analysis import (
+    FEWEST_SEEDS,
+    Results,
+    compute_tango_interval,
+    compute_wilson_interval,
+    contrast,
+    summarise,
+)
 from apo_bench.benchmark.report.answer import ALIKE_WITHIN, answer
 from tests.benchmark.analysis.test_rates import row
 
@@ -19,7 +26,7 @@ COUNT = re.compile(r"`([^`]+)`(?: with \d reobservations)? (?:succeeds )?in ([\d
 
 
 def said(rows: list[dict[str, Any]]) -> str:
-    return answer(rows, summary(rows).half_levels)
+    return answer(rows, summarise(rows).half_levels)
 
 
 def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[str, Any]]:
@@ -28,8 +35,8 @@ def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[
 
 def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
     rows = [row("contact", i, i > 0) for i in range(20)] + [row("uncorrected", i, i > 11) for i in range(20)]
-    low, high = wilson(19, 20)
-    least, most = tango(11, 0, 20)
+    low, high = compute_wilson_interval(19, 20)
+    least, most = compute_tango_interval(11, 0, 20)
     assert said(rows) == (
         f"`contact` succeeds in 19 of 20 trials (95.0 %; 95 % interval {100 * low:.1f} to {100 * high:.1f} %). "
         "`uncorrected` succeeds in 8 of the same 20: `contact` succeeds more often, by 55.0 points (95 % interval "
@@ -70,7 +77,7 @@ def test_it_says_where_the_curve_falls_to_one_half() -> None:
         for m in ("contact", "paper")
         for i in range(30)
     ]
-    half, _ = summary(rows).half_levels
+    half, _ = summarise(rows).half_levels
     words = f"Its success falls to one half at noise level {half.text} (surely: {half.sure_text})."
     assert words in said(rows)
 

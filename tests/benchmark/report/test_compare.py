@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from apo_bench import InputError
-from apo_bench.benchmark.analysis import wilson
+from apo_bench.benchmark.analysis import compute_wilson_interval
 from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.benchmark.report.comparison.text import comparison_form, in_words
 from apo_bench.cli import app as cli
@@ -58,7 +58,7 @@ def test_the_same_trials_are_met_whatever_the_fidelity(folders: tuple[Path, Path
     counts = ("scenario", "same_verdict", "trials", "right_in_first_alone", "right_in_second_alone", "excluded_in_one")
     assert [tower[name] for name in counts] == ["stick_in_tower", 37, 39, 1, 1, 0]
     assert (other["same_verdict"], other["trials"]) == (9, 9)
-    assert (every["same_verdict_low_95"], every["same_verdict_high_95"]) == wilson(46, 48)
+    assert (every["same_verdict_low_95"], every["same_verdict_high_95"]) == compute_wilson_interval(46, 48)
     assert [every[name] for name in ("same_stage_and_code", "same_verdicts_in_all", "seeds")] == [46, 37, 39]
     assert [line["seed"] for line in found.changed] == [0, 1]
     (gap,) = (line for line in found.numbers if line["name"] == "worst_gap_mm")

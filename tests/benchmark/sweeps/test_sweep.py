@@ -20,7 +20,7 @@ from apo_bench.assembly import Outcome
 from apo_bench.benchmark.sweeps import sweep as runner
 from apo_bench.benchmark.sweeps import worker
 from apo_bench.benchmark.sweeps.grid import load_all, units
-from apo_bench.records import ENV_ID, RECORD_SCHEMA, record_key, setting_columns, trial_key
+from apo_bench.records import ENV_ID, RECORD_SCHEMA, get_record_key, list_setting_columns, make_trial_key
 from apo_bench.records.run.run_folder import read_records
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import endings, run
@@ -61,7 +61,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
             "schema": RECORD_SCHEMA,
             "env_id": ENV_ID,
             "config_hash": hashed,
-            **setting_columns(spec, scene.scenario.name),
+            **list_setting_columns(spec, scene.scenario.name),
             **ended,
         }
 
@@ -77,7 +77,7 @@ def test_the_grid_is_every_combination_once() -> None:
     two = ("stick_in_tower", "stick_on_castles")
     spec = SweepConfig(two, (0, 1, 1), (0, 1), METHODS, clearance_mm=(0.25, 0.5), trials=2)
     loaded = load_all([spec])
-    keys = [trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit]
+    keys = [make_trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
     assert {key[2] for key in keys} == {0, 1}
 
@@ -89,7 +89,7 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
     assert spec.contact_source == ("given", "false-negative", "shifted:3")
     loaded = load_all([spec])
     trials = [t for unit in units([spec], loaded) for t in unit]
-    keys = {trial_key(t, "stick_in_tower") for t in trials}
+    keys = {make_trial_key(t, "stick_in_tower") for t in trials}
     assert len(keys) == len(trials) == 3 * (1 + 2 * 2 * (1 + 3))
     met = {m: {(t.noise, t.contact_source) for t in trials if t.method == m} for m in spec.method}
     assert met["oracle"] == {("isotropic", "given")}
@@ -114,7 +114,7 @@ def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path
     assert len(rows) == ROWS
     assert read_records(tmp_path / "new" / "run") == rows
     timing = [json.loads(line) for line in (tmp_path / "new" / "run" / "timing.jsonl").open()]
-    assert [record_key(t) for t in timing] == [record_key(r) for r in rows]
+    assert [get_record_key(t) for t in timing] == [get_record_key(r) for r in rows]
     assert {"trial_s", "demonstrate_s", "host", "worker"} <= set(timing[0])
     run = json.loads((tmp_path / "new" / "run" / "run.json").read_text())
     assert run["command"] == "apo-bench sweep ..."
@@ -249,7 +249,7 @@ def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp
     assert len(set(seen.values())) == 1
     assert {(t.pose_source, t.noise) for t in trials if t.method == "oracle"} == {("noise-model", "isotropic")}
     rows = runner.run_sweep(spec, tmp_path / "pose_source")
-    assert len(rows) == len(trials) == len({record_key(row) for row in rows})
+    assert len(rows) == len(trials) == len({get_record_key(row) for row in rows})
     per_careless = {(t.scenario, t.seed, t.human_error_scale, t.pose_source) for t in trials}
     assert counted["demonstration"] == len(per_careless)
 
@@ -267,7 +267,7 @@ def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str
 def test_several_grids_make_one_folder(counted: Counter[str], tmp_path: Path) -> None:
     further = replace(SPEC, noise_level=(1.0, 2.0), method=("paper",), trials=1)
     rows = runner.run_sweep([SPEC, further], tmp_path)
-    assert len({record_key(row) for row in rows}) == len(rows) == ROWS + 1
+    assert len({get_record_key(row) for row in rows}) == len(rows) == ROWS + 1
     assert len(json.loads((tmp_path / "run.json").read_text())["grids"]) == 2
     with pytest.raises(InputError, match="it had 2 grids, now 1"):
         runner.run_sweep(SPEC, tmp_path)

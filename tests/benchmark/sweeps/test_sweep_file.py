@@ -10,7 +10,7 @@ from apo_bench import InputError, SweepConfig, run_sweep
 from apo_bench.benchmark.sweeps.grid import load_all, units
 from apo_bench.benchmark.sweeps.sweep_file import is_sweep_file, read_sweep
 from apo_bench.cli.app import main
-from apo_bench.records import CORRECTOR, trial_key
+from apo_bench.records import CORRECTOR, make_trial_key
 from apo_bench.resources import folder
 
 WHOLE = """
@@ -74,7 +74,7 @@ def test_trials_of_all_grids_are_united_each_once() -> None:
     other = SweepConfig(("block_on_block",), ((2, 1),), (1,), ("uncorrected",), trials=1, seed=6)
     loaded = load_all([first, again, other])
     trials = [t for unit in units([first, again, other], loaded) for t in unit]
-    keys = [trial_key(t, loaded[t.scenario].name) for t in trials]
+    keys = [make_trial_key(t, loaded[t.scenario].name) for t in trials]
     assert len(set(keys)) == len(keys) == 2 * (1 + 2 * 2 * 2) + 1 * (1 + 2) + 1
     assert [(t.seed, t.noise_mm, t.noise_deg) for t in trials if t.scenario == "block_on_block"] == [(6, 2.0, 1.0)]
     for unit in units([first, again, other], loaded):

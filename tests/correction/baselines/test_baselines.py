@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from apo_bench import Observation, correct
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from apo_bench.correction.baselines.intruding_boxes import intruding, meeting
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import loss
 from apo_bench.geometry import Array, pose
-from apo_bench.geometry.penetration import intrusion
+from apo_bench.geometry.penetration import measure_intrusion
 from apo_bench.simulation.scene.settling import settle
 from tests import scenes
 
@@ -121,11 +121,11 @@ def test_depth_is_the_shortest_way_out() -> None:
     built = scenes.bridge()
     goals = built.goals.copy()
     goals[1, :3, 3] += (-2e-3, 1e-3, -0.5e-3)
-    system = contact_equations(built.assembly, built.start, goals)
+    system = build_contact_equations(built.assembly, built.start, goals)
     found = intruding(meeting(built.assembly, system), goals)
     solids = built.assembly.solids
     T = dict(zip(("B", "C", "A"), goals, strict=True)) | {"table": built.start["table"]}
-    expected = [intrusion(solids[a], T[a], solids[b], T[b]) for a, b in (("C", "B"), ("C", "table"))]
+    expected = [measure_intrusion(solids[a], T[a], solids[b], T[b]) for a, b in (("C", "B"), ("C", "table"))]
     depths = -found.residual(goals)
     assert sorted(depths[depths > 1e-9]) == pytest.approx(sorted(expected), abs=1e-12)
     assert max(expected) == pytest.approx(2e-3)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from apo_bench import Assembly
-from apo_bench.assembly import Relation, contact_equations
+from apo_bench.assembly import Relation, build_contact_equations
 from apo_bench.correction.baselines.candidates import candidates
 from tests import scenes
 from tests.assembly.test_equations import random_scene
@@ -64,7 +64,7 @@ def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> No
     scene = random_scene(seed)
     rng = np.random.default_rng(seed)
     n = len(scene.assembly)
-    system = contact_equations(scene.assembly, scene.start, scene.goals)
+    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
     failing = rng.random(len(system.letters)) < 0.3
     free = candidates(scene.assembly, failing)
     assert free == tuple(sorted(set(free), reverse=True))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Correction, InputError, Observation, correct
-from apo_bench.assembly import Step, Try, contact_equations, largest_gap
+from apo_bench.assembly import FreeingTrial, Step, build_contact_equations, measure_largest_gap
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.solvers.newton import LENGTH_M, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
@@ -51,7 +51,7 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
-    system = contact_equations(scene.assembly, scene.start, goals)
+    system = build_contact_equations(scene.assembly, scene.start, goals)
     return solve_newton(system.among(system.containing(freed)), goals, freed).gap_m * 1e3
 
 
@@ -102,8 +102,8 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
         assert found.gap_after_m < NOTHING_M
-        assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses) > 3e-4
-        assert largest_gap(seen.assembly, seen.start, found.poses) < NOTHING_M
+        assert found.gap_before_m == measure_largest_gap(seen.assembly, seen.start, seen.poses) > 3e-4
+        assert measure_largest_gap(seen.assembly, seen.start, found.poses) < NOTHING_M
         assert is_rigid(found.poses).all()
 
 
@@ -119,7 +119,7 @@ def test_the_world_frame_does_not_matter() -> None:
 def drift(scene: scenes.Scene, seen: Array) -> float:
     """How far the solver moved what no contact fixes, over 2 mm; rotations as the way of a point 40 mm away."""
     n = len(seen)
-    system = contact_equations(scene.assembly, scene.start, seen)
+    system = build_contact_equations(scene.assembly, scene.start, seen)
     found = solve_newton(system, seen, range(n))
     assert found.gap_m < NOTHING_M
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], n)
@@ -165,7 +165,7 @@ def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
     found = paper(replace(scenes.seen(scene, goals), observed=np.array([True, False, True])))
     assert (found.status, found.sentence, found.freed) == ("not_seen", "operation 2 was not seen", ())
     assert_array_equal(found.poses, goals)
-    assert found.gap_before_m == found.gap_after_m == largest_gap(scene.assembly, scene.start, goals)
+    assert found.gap_before_m == found.gap_after_m == measure_largest_gap(scene.assembly, scene.start, goals)
 
 
 def test_numbers_that_overflow_are_not_finite() -> None:
@@ -242,7 +242,7 @@ def test_bare_goals_are_measured_and_wrapped() -> None:
     goals = paper(seen).poses
     found = correct(seen, lambda observation: goals)
     assert (found.status, found.freed, found.rank) == ("converged", (2, 1, 0), 13)
-    assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.poses)
+    assert found.gap_before_m == measure_largest_gap(seen.assembly, seen.start, seen.poses)
     assert found.gap_after_m < NOTHING_M
     assert correct(seen, lambda observation: observation.poses).freed == ()
 
@@ -286,7 +286,7 @@ def returning(**changed: Any) -> Callable[[Observation], Correction]:
     ("changed", "message"),
     [
         ({"schedule": "1 2 3"}, "schedule of Correction must be a list (each entry a Step), got '1 2 3'"),
-        ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
+        ({"tried": (FreeingTrial(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
         (
             {"schedule": steps("1 2 3"), "step_poses": np.tile(np.eye(4), (3, 1, 1))},
             "returned a last step pose of operation 1 that is not its pose",

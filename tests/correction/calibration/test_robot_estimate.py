@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import InputError
-from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, prior_estimate, slip_sigmas
+from apo_bench.correction.calibration import UNKNOWN, RobotEstimate, Touch, compute_slip_sigmas, make_prior_estimate
 from apo_bench.geometry import pose
 from apo_bench.records.robot_error import Sigmas
 
@@ -47,7 +47,7 @@ def around() -> list[tuple[float, float]]:
 def taught(seed: int = 0) -> RobotEstimate:
     """A belief of which every unknown is other than zero."""
     rng = np.random.default_rng(seed)
-    belief = prior_estimate(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
+    belief = make_prior_estimate(UNKNOWN, 6, MIDDLE).grasp(3, FREE)
     for _ in range(12):
         n = rng.standard_normal(3)
         n /= np.linalg.norm(n)
@@ -70,7 +70,7 @@ def test_what_is_commanded_really_comes_to_be() -> None:
 
 
 def test_without_touches_nothing_moves() -> None:
-    belief = prior_estimate(UNKNOWN, 6, MIDDLE).grasp(0, slip_sigmas(UNKNOWN))
+    belief = make_prior_estimate(UNKNOWN, 6, MIDDLE).grasp(0, compute_slip_sigmas(UNKNOWN))
     assert_array_equal(belief.touch().mean, belief.mean)
     assert_allclose(belief.real(DOWN, jacobian()), DOWN, atol=1e-16)
     assert_allclose(belief.goal_tip(DOWN @ HELD, 0, HELD), DOWN, atol=1e-15)
@@ -82,7 +82,7 @@ def test_without_touches_nothing_moves() -> None:
 def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
     xi = np.array([0.8e-3, -1.1e-3, 1.7e-3, 4e-3, -6e-3, 3e-3])
     E = displaced(xi)
-    belief = prior_estimate(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
+    belief = make_prior_estimate(ONLY_HAND_EYE, 0, MIDDLE).touch(*(touch_of(E, at, 1e-9) for at in around()))
     # the plane as felt: what lies in it comes to where it really is in height, wherever
     for at in [(0.5, 0.1), (0.3, -0.2)]:
         B = pose.at((*at, 0.0), (180.0, 0.0, 0.0))
@@ -99,7 +99,7 @@ def test_three_touches_of_a_plane_tell_height_and_both_tilts() -> None:
 def test_the_order_of_touches_does_not_matter() -> None:
     E = displaced(np.array([0.3e-3, 0.5e-3, -0.9e-3, 2e-3, 3e-3, -1e-3]))
     touches = [touch_of(E, at, 5e-5) for at in around()] + [touch_of(E, (0.5, 0.1), 5e-5, off_m=3e-3)]
-    prior = prior_estimate(UNKNOWN, 6, MIDDLE)
+    prior = make_prior_estimate(UNKNOWN, 6, MIDDLE)
     first = prior.touch(*touches)
     assert [one.offset for one in first.refused] == [touches[3].offset]
     for order in permutations(touches):
@@ -114,11 +114,11 @@ def test_the_order_of_touches_does_not_matter() -> None:
 
 def test_a_grasp_made_anew_forgets_the_part_and_keeps_the_robot() -> None:
     belief = taught()
-    anew = belief.grasp(3, slip_sigmas(UNKNOWN))
+    anew = belief.grasp(3, compute_slip_sigmas(UNKNOWN))
     assert_array_equal(anew.held(3, HELD), HELD)
     assert_array_equal(anew.real(DOWN, jacobian()), belief.real(DOWN, jacobian()))
     assert_allclose(anew.touch().mean[:21], belief.mean, atol=1e-12)
-    assert_allclose(np.sqrt(np.diag(anew.covariance)[21:]), slip_sigmas(UNKNOWN))
+    assert_allclose(np.sqrt(np.diag(anew.covariance)[21:]), compute_slip_sigmas(UNKNOWN))
     assert anew.touches == belief.touches
 
 
@@ -126,7 +126,7 @@ def test_joints_are_told_through_the_jacobian() -> None:
     """Touches of a robot whose encoders alone are off: with its Jacobians the touched heights are explained."""
     rng = np.random.default_rng(4)
     delta = np.radians(0.05) * rng.standard_normal(6)
-    prior = prior_estimate(Sigmas(joints_deg=0.05), 6, MIDDLE)
+    prior = make_prior_estimate(Sigmas(joints_deg=0.05), 6, MIDDLE)
     touches = []
     for seed in range(8):
         B = pose.at(MIDDLE + rng.uniform(-0.2, 0.2, 3), (180.0, 0.0, rng.uniform(-180.0, 180.0)))
@@ -138,7 +138,7 @@ def test_joints_are_told_through_the_jacobian() -> None:
 
 
 def test_wrong_requests_get_one_sentence() -> None:
-    belief = prior_estimate(UNKNOWN, 6, MIDDLE)
+    belief = make_prior_estimate(UNKNOWN, 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 2 was given; grasps so far: none; call"):
         belief.held(2, HELD)
     with pytest.raises(InputError, match=r"an array of shape \(6, 6\) is needed"):
@@ -150,17 +150,17 @@ def test_wrong_requests_get_one_sentence() -> None:
     with pytest.raises(InputError, match=r"an array of shape \(6\) is needed"):
         belief.grasp(0, np.zeros(3))
     with pytest.raises(InputError, match="-1 joints were given"):
-        prior_estimate(UNKNOWN, -1, MIDDLE)
-    with pytest.raises(InputError, match=r"joints of prior_estimate must be a whole number, got 1.5"):
-        prior_estimate(UNKNOWN, 1.5, MIDDLE)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="sigmas of prior_estimate must be a Sigmas, got 'unknown'"):
-        prior_estimate("unknown", 6, MIDDLE)  # type: ignore[arg-type]
+        make_prior_estimate(UNKNOWN, -1, MIDDLE)
+    with pytest.raises(InputError, match=r"joints of make_prior_estimate must be a whole number, got 1.5"):
+        make_prior_estimate(UNKNOWN, 1.5, MIDDLE)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="sigmas of make_prior_estimate must be a Sigmas, got 'unknown'"):
+        make_prior_estimate("unknown", 6, MIDDLE)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a list was given as a touch; give each as a Touch"):
         belief.touch([])  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"of prior_estimate|every number must be finite"):
-        prior_estimate(UNKNOWN, 6, np.full(3, np.nan))
+    with pytest.raises(InputError, match=r"of make_prior_estimate|every number must be finite"):
+        make_prior_estimate(UNKNOWN, 6, np.full(3, np.nan))
     with pytest.raises(InputError, match="every number must be finite"):
-        prior_estimate(Sigmas(hand_eye=(np.nan, 0.0)), 6, MIDDLE)
+        make_prior_estimate(Sigmas(hand_eye=(np.nan, 0.0)), 6, MIDDLE)
     with pytest.raises(InputError, match="grasp 0 was given"):
         belief.touch(Touch(DOWN, UP, 0.0, np.zeros(3), 1e-5, None, 0, HELD))
     with pytest.raises(InputError, match="an array of"):

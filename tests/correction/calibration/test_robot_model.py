@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 
 from apo_bench.correction.calibration.robot_model import (
     Places,
+    compute_part_poses,
     grasp_in,
     hand_eye_displacement,
-    part_poses,
     tip_displacement,
 )
 from apo_bench.geometry import Array, pose
@@ -40,7 +40,7 @@ def test_a_part_is_where_its_factors_put_it(seed: int) -> None:
     unknowns = 0.1 * rng.standard_normal(UNKNOWNS)
     middle = rng.uniform(-1.0, 1.0, 3)
     places = some_places(rng)
-    T, D = part_poses(unknowns, middle, places)
+    T, D = compute_part_poses(unknowns, middle, places)
     for i, (B, J, held, grasp) in enumerate(zip(*places, strict=True)):
         slip = pose.exp(unknowns[grasp_in(JOINTS, grasp)]) if grasp >= 0 else np.eye(4)
         tip = hand_eye_displacement(unknowns, middle) @ B @ tip_displacement(unknowns, J)

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from apo_bench.correction.calibration import Touch
-from apo_bench.correction.calibration.robot_model import Places, part_poses
+from apo_bench.correction.calibration.robot_model import Places, compute_part_poses
 from apo_bench.correction.calibration.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.geometry import Array, pose
 
@@ -47,7 +47,7 @@ def heights(felt: Sequence[NumberedTouch], unknowns: Array) -> Array:
     jacobians = [t.jacobian for t, _ in felt]
     tips = [t.T_world_tip for t, _ in felt]
     places = Places(*map(np.array, (tips, jacobians, held, [grasp for _, grasp in felt])))
-    T = part_poses(unknowns, MIDDLE, places)[0]
+    T = compute_part_poses(unknowns, MIDDLE, places)[0]
     return np.array(
         [t.normal @ (Ti[:3, :3] @ t.point + Ti[:3, 3]) - t.offset for Ti, (t, _) in zip(T, felt, strict=True)]
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Correction, InputError, Observation, correct, correct_many
-from apo_bench.assembly import largest_gap
+from apo_bench.assembly import measure_largest_gap
 from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import Array
 from tests import scenes
@@ -84,7 +84,7 @@ def lying(seen: Observation, **changed: Any) -> Correction:
 
 def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     one = seen()
-    open_m = largest_gap(one.assembly, one.start, one.poses)
+    open_m = measure_largest_gap(one.assembly, one.start, one.poses)
     assert open_m > 1e-3
     for claimed in (0.0, float("nan"), -1.0):
         made = correct(one, lambda seen, claimed=claimed: lying(seen, gap_after_m=claimed))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from apo_bench import correct
-from apo_bench.assembly import contact_equations, faces_away, largest_gap
-from apo_bench.correction.solvers.compact import compact_equations
-from apo_bench.correction.solvers.gauss_newton import nearest_poses
+from apo_bench.assembly import build_contact_equations, find_faces_away, measure_largest_gap
+from apo_bench.correction.solvers.compact import build_compact_equations
+from apo_bench.correction.solvers.gauss_newton import find_nearest_poses
 from apo_bench.correction.solvers.newton_descent import descend_to_nearest
-from apo_bench.correction.solvers.whitened import correction_to, scales
+from apo_bench.correction.solvers.whitened import factor_covariance, whiten_poses
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown
 
@@ -24,7 +24,7 @@ def turned(name, k, turn, seed=0):
 
 
 def length(observation, goals):
-    return np.linalg.norm(correction_to(observation.poses, scales(observation.covariance), goals))
+    return np.linalg.norm(whiten_poses(observation.poses, factor_covariance(observation.covariance), goals))
 
 
 @pytest.mark.parametrize(("name", "k"), [("block_on_block", 1), ("pocket_table", 3)])
@@ -46,21 +46,21 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
         found = correct(seen, "contact")
         assert found.ok
         assert length(seen, found.poses) <= length(seen, layout.poses)
-        assert largest_gap(seen.assembly, seen.start, found.poses) <= seen.gap_m
+        assert measure_largest_gap(seen.assembly, seen.start, found.poses) <= seen.gap_m
 
 
 def test_where_contacts_bend_newton_ends_where_small_steps_would():
     """A cube seen upside down: each turn of it is about as far, so small steps shrink by a percent only."""
     seen = turned("block_on_block", 1, [180, 0, 0])
-    L = scales(seen.covariance)
+    L = factor_covariance(seen.covariance)
     goals = correct(seen, "contact").poses
-    system = compact_equations(contact_equations(seen.assembly, seen.start, goals), 2)
+    system = build_compact_equations(build_contact_equations(seen.assembly, seen.start, goals), 2)
     beside = goals.copy()
     beside[1] = beside[1] @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
     assert length(seen, beside) > length(seen, goals)
     there = descend_to_nearest(system, seen.poses, L, beside)
     assert length(seen, there) == pytest.approx(length(seen, goals), rel=1e-9)
-    creeping = nearest_poses(system, seen.poses, L, None, correction_to(seen.poses, L, beside))
+    creeping = find_nearest_poses(system, seen.poses, L, None, whiten_poses(seen.poses, L, beside))
     assert not creeping.at_rest
     assert length(seen, creeping.poses) > length(seen, there)
-    assert not faces_away(seen.assembly, seen.start, there).any()
+    assert not find_faces_away(seen.assembly, seen.start, there).any()

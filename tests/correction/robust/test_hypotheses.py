@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, placements
+from apo_bench.assembly import OutlierModel, compute_placements
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.wrong_contacts import make_contacts, with_contacts
+from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
 from apo_bench.trial.pose_error import goal_errors
 from tests.correction.robust.test_reobservations import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
@@ -33,7 +33,7 @@ def test_a_part_that_is_seen_where_it_was_before_is_said_to_be(seed):
     name = "vanished_fixture"
     observation = look(name, seed)
     first = shown(name, seed)[2]
-    before = (first.start, *placements(first.assembly, first.start, first.poses))[4]["stick"]
+    before = (first.start, *compute_placements(first.assembly, first.start, first.poses))[4]["stick"]
     off = pose.exp(np.repeat([1e-3, np.radians(1.0)], 3) * np.random.default_rng(seed).standard_normal(6))
     found = correct(seen_at(observation, 4, before @ off))
     assert found.left_out == (4,)
@@ -120,7 +120,7 @@ def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
     layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
     first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((10, 6, 6)))
     seen = make_noise("isotropic", NoiseLevel(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
-    wrong = with_contacts(seen, make_contacts("false-positive"), layout.poses, np.random.default_rng([13, 9]))
+    wrong = replace_contacts(seen, make_contacts("false-positive"), layout.poses, np.random.default_rng([13, 9]))
     found = correct(wrong)
     assert found.ok
     assert found.dropped

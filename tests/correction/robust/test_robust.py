@@ -8,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, faces_away, largest_gap
+from apo_bench.assembly import OutlierModel, find_faces_away, measure_largest_gap
 from apo_bench.correction.contact.inferred import infer_poses
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.robust.crowding import crowding
 from apo_bench.correction.robust.robust import UNNAMED, contact_robust
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, with_contacts
+from apo_bench.perception.observation.wrong_contacts import culprit, make_contacts, replace_contacts
 from apo_bench.trial.pose_error import goal_errors
 from tests.shipped import BOXES
 
@@ -73,8 +73,8 @@ def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
             observation = astray(look(name, 2), k)
             found = correct(observation, "contact-robust")
             assert found.ok
-            assert largest_gap(scenario.assembly, observation.start, found.poses) <= observation.gap_m
-            assert not faces_away(scenario.assembly, observation.start, found.poses).any()
+            assert measure_largest_gap(scenario.assembly, observation.start, found.poses) <= observation.gap_m
+            assert not find_faces_away(scenario.assembly, observation.start, found.poses).any()
             all_of_them += 1
             right += found.left_out == (k,) and f"; left out what was seen of operation {k + 1}" in found.sentence
     assert right >= all_of_them - 1
@@ -115,7 +115,7 @@ def test_a_single_operation_that_was_seen_turned_is_turned_back():
     assert found.ok
     assert found.dropped == ()
     assert "seen turned: operation 1" in found.sentence
-    assert not faces_away(single, made.start, found.poses).any()
+    assert not find_faces_away(single, made.start, found.poses).any()
 
 
 def test_parts_of_which_too_little_was_seen_are_beside_the_others():
@@ -148,7 +148,7 @@ def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():
 def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
     observation = look("vanished_fixture", 5)
-    wrong = with_contacts(
+    wrong = replace_contacts(
         observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
     )
     found = correct(wrong, "contact-robust")
@@ -166,7 +166,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     """Without the whole relation the goal would be as far off as it was seen."""
     observation = look("pocket_table", seed)
     truth = shown("pocket_table", seed)[1].poses
-    wrong = with_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
+    wrong = replace_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
     found = correct(wrong, "contact-robust")
     assert found.ok
     assert found.left_out == ()

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Equations, contact_equations, placements
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
+from apo_bench.assembly import Equations, build_contact_equations, compute_placements
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, moments
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import random_scene
@@ -20,8 +20,8 @@ SEEDS = st.integers(0, 10**6)
 
 
 def both(scene: scenes.Scene) -> tuple[Equations, CompactEquations]:
-    system = contact_equations(scene.assembly, scene.start, scene.goals)
-    return system, compact_equations(system, len(scene.goals))
+    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
+    return system, build_compact_equations(system, len(scene.goals))
 
 
 def dense(system: CompactEquations, T: Array) -> tuple[Array, Array]:
@@ -54,7 +54,7 @@ def test_words_are_relative_poses(seed: int) -> None:
     scene = random_scene(seed)
     _, small = both(scene)
     assume(len(small))
-    history = placements(scene.assembly, scene.start, scene.goals)
+    history = compute_placements(scene.assembly, scene.start, scene.goals)
     words = small.words.products(small.constants, scene.goals)
     for (contact, made, _), word in zip(scene.assembly.relations(), words, strict=True):
         a, b = (history[made][end.part] for end in contact)

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from apo_bench import ContactCorrector, Observation, correct, correct_many, load_scenario
-from apo_bench.assembly import contact_equations
+from apo_bench.assembly import build_contact_equations
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers import kernels
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses
 from apo_bench.correction.solvers.linear_step import DenseStep
-from apo_bench.correction.solvers.whitened import coordinates_of
+from apo_bench.correction.solvers.whitened import whiten_twists
 from apo_bench.geometry import Array, pose
 from tests.correction.test_many import check_same
 
-by_kernels = partial(nearest_poses, kernels=kernels.kernels())
+by_kernels = partial(find_nearest_poses, kernels=kernels.kernels())
 SCENARIOS = ("stick_on_castles", "vanished_fixture", "pocket_table")
 LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
 """Noise in mm and degrees, and how far goals may differ, [m]. At the larger one rounding grows on the way: the plain
@@ -36,7 +36,7 @@ def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[CompactEquat
     twisted = np.tril(rng.normal(scale=0.2, size=(len(given.assembly), 6, 6)), -1) + np.eye(6)
     L = sigma[:, :, None] * twisted
     goals = given.goals @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
-    return compact_equations(contact_equations(given.assembly, given.start, goals), len(goals)), goals, L
+    return build_compact_equations(build_contact_equations(given.assembly, given.start, goals), len(goals)), goals, L
 
 
 def alike(expected: NearestPoses, actual: NearestPoses, within_m: float) -> None:
@@ -61,7 +61,7 @@ def _numba() -> None:
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
     for seed in range(3):
         given = drawn(name, *level, seed)
-        alike(nearest_poses(*given), by_kernels(*given), LEVELS[level])
+        alike(find_nearest_poses(*given), by_kernels(*given), LEVELS[level])
 
 
 @pytest.mark.numeric
@@ -127,7 +127,7 @@ def test_kernels_run_as_they_stand(turn: float) -> None:
     rng = np.random.default_rng(0)
     xi = rng.standard_normal((1, len(goals), 6))
     xi[..., 3:] *= turn / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
-    z = coordinates_of(L, xi)
+    z = whiten_twists(L, xi)
     rows = np.arange(1)
     mu = np.array([1e-3])
     plain, looped = (DenseStep(system, goals[None], L[None], None, some) for some in (None, kernels.PLAIN))

@@ -13,7 +13,7 @@ from apo_bench import Assembly, correct
 from apo_bench.assembly import Operation
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses, solve_batch
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses, solve_batch
 from apo_bench.geometry import Array
 from benchmarks.corrector_problems import problem
 from tests import scenes
@@ -86,7 +86,7 @@ def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m
 def test_sparse_is_dense(name: str, way: str) -> None:
     system, seen, L = drawn(name)
     large = nearest_goals_sparse(system, seen, L)
-    small = nearest_poses(system, seen[None], L)
+    small = find_nearest_poses(system, seen[None], L)
     assert large.at_rest
     assert small.at_rest.all()
     assert_allclose(large.poses, small.poses[0], rtol=0, atol=1e-9)
@@ -102,18 +102,18 @@ def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeyp
     monkeypatch.setattr(sparse, "FEW", few)
     for seed in range(2):
         system, seen, L = drawn(name, seed)
-        Jt = nearest_poses(system, seen[None], L).Jt[0]
-        assert sparse.sparse_rank(csr_array(Jt)) == posterior.jacobian_rank(Jt) == SMALL[name][1]
+        Jt = find_nearest_poses(system, seen[None], L).Jt[0]
+        assert sparse.sparse_rank(csr_array(Jt)) == posterior.compute_jacobian_rank(Jt) == SMALL[name][1]
 
 
 @pytest.mark.parametrize("name", SMALL)
 def test_what_a_sparse_matrix_leaves_free_is_what_its_singular_vectors_say(name: str) -> None:
     """Both are off by rounding over the smallest singular value: the largest difference seen was 2e-12."""
     system, seen, L = drawn(name)
-    Jt = nearest_poses(system, seen[None], L).Jt[0]
+    Jt = find_nearest_poses(system, seen[None], L).Jt[0]
     free = sparse.free_basis(csr_array(Jt), *posterior.UNCLEAR)
     assert free is not None
-    known = posterior.freedom_of(Jt)
+    known = posterior.compute_freedom(Jt)
     assert known is not None
     assert_allclose(free.T @ free, np.eye(len(Jt) - SMALL[name][1]), rtol=0, atol=1e-12)
     assert_allclose(free @ free.T, known.free @ known.free.T, rtol=0, atol=1e-9)
@@ -124,10 +124,10 @@ def test_a_thousand_blocks_on_one_plate() -> None:
     scene = hub(n)
     L = scales(n, 0.5, 0.02)
     seen = twisted(scene.goals, L, np.random.default_rng(0))
-    found = nearest_poses(system_of(scene, seen), seen, L)
+    found = find_nearest_poses(system_of(scene, seen), seen, L)
     assert found.at_rest
     assert np.abs(found.e).max() <= 1e-9
-    assert posterior.jacobian_rank(found.Jt) == 3 * n
+    assert posterior.compute_jacobian_rank(found.Jt) == 3 * n
     truth = correction(seen, scene.goals, L)
     assert found.z @ found.z <= truth @ truth
 

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
-from apo_bench.assembly import contact_equations
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import NearestPoses, nearest_poses
-from apo_bench.correction.solvers.posterior import jacobian_rank
+from apo_bench.assembly import build_contact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
+from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses
+from apo_bench.correction.solvers.posterior import compute_jacobian_rank
 from apo_bench.geometry import Array, pose
 from tests import scenes
 
@@ -32,7 +32,7 @@ def crooked(n: int, rng: np.random.Generator, mm: float = 2.0, deg: float = 1.0)
 
 
 def system_of(scene: scenes.Scene, goals: Array) -> CompactEquations:
-    return compact_equations(contact_equations(scene.assembly, scene.start, goals), len(goals))
+    return build_compact_equations(build_contact_equations(scene.assembly, scene.start, goals), len(goals))
 
 
 def twisted(goals: Array, L: Array, rng: np.random.Generator) -> Array:
@@ -65,12 +65,12 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
         L = crooked(n, rng) if seed % 2 else scales(n, *level)
         seen = twisted(scene.goals, L, rng)
         system = system_of(scene, seen)
-        found = nearest_poses(system, seen, L)
+        found = find_nearest_poses(system, seen, L)
         assert found.at_rest
         assert found.finite
-        assert np.abs(contact_equations(scene.assembly, scene.start, seen).residual(found.poses)).max() <= 1e-12
+        assert np.abs(build_contact_equations(scene.assembly, scene.start, seen).residual(found.poses)).max() <= 1e-12
         J = jacobian(system, found)
-        assert jacobian_rank(J.T) == jacobian_rank(found.Jt) == RANKS[name]
+        assert compute_jacobian_rank(J.T) == compute_jacobian_rank(found.Jt) == RANKS[name]
         assert drift(J, found.z, RANKS[name]) <= 1e-6
         assert_allclose(found.poses, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
         truth = correction(seen, scene.goals, L)
@@ -84,7 +84,7 @@ def test_the_derivative_is_one() -> None:
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest_poses(system, seen, L)
+    found = find_nearest_poses(system, seen, L)
     by = 1e-4
     e = [
         [system.residual(seen @ pose.exp((L @ (found.z + sign * step).reshape(3, 6, 1))[..., 0])) for sign in (1, -1)]
@@ -100,7 +100,7 @@ def test_ever_stiffer_springs_lead_to_the_same() -> None:
     rng = np.random.default_rng(11)
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
-    plain = contact_equations(scene.assembly, scene.start, seen)
+    plain = build_contact_equations(scene.assembly, scene.start, seen)
 
     def pulls(z: Array, soft_m: float) -> Array:
         return np.concatenate([z, plain.residual(seen @ pose.exp((L @ z.reshape(3, 6, 1))[..., 0])) / soft_m])
@@ -108,7 +108,7 @@ def test_ever_stiffer_springs_lead_to_the_same() -> None:
     z = np.zeros(18)
     for soft_m in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
         z = least_squares(pulls, z, args=(soft_m,), xtol=1e-15, ftol=1e-15, gtol=1e-12).x
-    found = nearest_poses(system_of(scene, seen), seen, L)
+    found = find_nearest_poses(system_of(scene, seen), seen, L)
     assert found.z @ found.z == pytest.approx(z @ z, rel=1e-5)
     assert_allclose(found.z, z, rtol=0, atol=1e-3)
 
@@ -125,11 +125,11 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
         system = system_of(scene, seen)
         hard = np.repeat(rng.random(len(system)) < demands_of, 3)
         soft_m = np.where(hard, 0.0, rng.uniform(0.1e-3, 2e-3, len(hard)))
-        found = nearest_poses(system, seen, L, soft_m)
+        found = find_nearest_poses(system, seen, L, soft_m)
         assert found.at_rest
         assert np.abs(found.e[hard]).max(initial=0.0) <= 1e-11
         assert np.abs(found.e[~hard]).max() > 1e-6
         J = jacobian(system, found)
         gradient = found.z + J[~hard].T @ (found.e[~hard] / soft_m[~hard] ** 2)
-        free = np.linalg.svd(J[hard])[2][jacobian_rank(J[hard].T) :] if hard.any() else np.eye(6 * n)
+        free = np.linalg.svd(J[hard])[2][compute_jacobian_rank(J[hard].T) :] if hard.any() else np.eye(6 * n)
         assert np.linalg.norm(free @ gradient) <= 1e-4 * np.linalg.norm(found.z)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from apo_bench import Demonstration, correct_many, observe
-from apo_bench.assembly import contact_equations, contact_pattern
+from apo_bench.assembly import build_contact_equations, find_contact_pattern
 from apo_bench.correction.checks.chi_square import fit_deviation
 from apo_bench.correction.contact.contact import contact_refuse
-from apo_bench.correction.solvers.play import fit_covariance, plays
+from apo_bench.correction.solvers.play import count_plays, fit_covariance
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests.correction.robust.test_robust import shown
 
@@ -20,11 +20,11 @@ def by_contact(name, values):
 
 def test_each_fit_on_the_way_adds_its_play():
     """In the carrier before, in the carrier then, and in the slot: only along directions in which the carrier fits."""
-    bridge = by_contact("carried_bridge", plays(shown("carried_bridge")[0].assembly, PLAY_M)[0])
+    bridge = by_contact("carried_bridge", count_plays(shown("carried_bridge")[0].assembly, PLAY_M)[0])
     assert bridge["cube.nz on castle1.topP"] == 0.0
     assert bridge["stick.pz on cube.hpz"] == pytest.approx(1.0)
     assert bridge["stick.nz on castle1.sfl"] == pytest.approx(3.0)
-    pocket = by_contact("pocket_table", plays(shown("pocket_table")[0].assembly, PLAY_M)[0])
+    pocket = by_contact("pocket_table", count_plays(shown("pocket_table")[0].assembly, PLAY_M)[0])
     assert pocket["cube2.nz on table.top"] == 0.0
     assert pocket["cube2.nz on table.A_fl"] == pytest.approx(2.0)
     assert pocket["cube2.px on table.A_px"] == pytest.approx(1.0)
@@ -48,7 +48,7 @@ def test_faces_that_look_opposite_ways_are_off_by_the_same():
     assembly = shown("carried_bridge")[0].assembly
     number = {str(r.contact): i for i, r in enumerate(assembly.relations())}
     S = fit_covariance(assembly, 1.0)[::3, ::3]
-    corners = np.diff(contact_pattern(assembly).begin)
+    corners = np.diff(find_contact_pattern(assembly).begin)
     S = 3.0 * S / np.sqrt(np.outer(corners, corners))
     up = number["stick.pz on cube.hpz"]
     down = number["stick.nz on cube.hnz"]
@@ -64,7 +64,7 @@ def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     goals = np.array(layout.poses)
     goals[3, 2, 3] -= PLAY_M
     goals[4, 2, 3] -= 2.0 * PLAY_M
-    deep = contact_equations(scenario.assembly, layout.start, goals).gaps(goals)
+    deep = build_contact_equations(scenario.assembly, layout.start, goals).gaps(goals)
     assert by_contact("carried_bridge", deep)["stick.nz on castle1.sfl"] == pytest.approx(3.0 * PLAY_M)
     human = Demonstration(scenario.assembly, layout.start, goals, layout.start, np.zeros((5, 6, 6)), play_m=PLAY_M)
     rng = np.random.default_rng(0)

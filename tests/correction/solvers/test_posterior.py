@@ -14,8 +14,13 @@ from numpy.testing import assert_allclose
 from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.gauss_newton import nearest_poses
-from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settle_basis
+from apo_bench.correction.solvers.gauss_newton import find_nearest_poses
+from apo_bench.correction.solvers.posterior import (
+    compute_freedom,
+    compute_jacobian_rank,
+    compute_projections,
+    settle_basis,
+)
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -35,10 +40,10 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     L = crooked(len(scene.goals), rng, 5.0, 3.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest_poses(system, seen, L)
-    known = freedom_of(found.Jt)
+    found = find_nearest_poses(system, seen, L)
+    known = compute_freedom(found.Jt)
     assert known is not None
-    assert known.rank == jacobian_rank(found.Jt) == RANKS[name]
+    assert known.rank == compute_jacobian_rank(found.Jt) == RANKS[name]
     assert known.free.shape == (6 * n, 6 * n - RANKS[name])
     assert known.redundant == 3 * len(system) - RANKS[name]
     assert known.spectral_gap > 1e5
@@ -57,13 +62,13 @@ def test_observations_together_have_the_rank_and_the_projection_of_each() -> Non
     J[2, :4] = rng.standard_normal((4, 3)) @ J[2, 4:7]
     J[3, 1] = J[3, 0] * (1.0 + 1e-15)
     J[4] = 0.0
-    rank, P = projections(np.swapaxes(J, 1, 2))
+    rank, P = compute_projections(np.swapaxes(J, 1, 2))
     assert rank == [4, 4, 4, 7, 0, 8]
     assert P is not None
     for each, free, fixed in zip(J, P, rank, strict=True):
         N = np.linalg.svd(each)[2][fixed:]
         assert_allclose(free, N.T @ N, rtol=0, atol=1e-9)
-    alone = [projections(np.swapaxes(each, 0, 1)[None])[0][0] for each in J]
+    alone = [compute_projections(np.swapaxes(each, 0, 1)[None])[0][0] for each in J]
     assert alone == rank
 
 

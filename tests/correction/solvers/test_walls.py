@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import nnls
 
 from apo_bench import Assembly, Observation, correct
-from apo_bench.assembly import Contact, Gap, contact_equations
-from apo_bench.geometry import Array, pose, right_jacobian
+from apo_bench.assembly import Contact, Gap, build_contact_equations
+from apo_bench.geometry import Array, compute_right_jacobian, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import correction, crooked, scales, twisted
 
@@ -44,7 +44,7 @@ def look(assembly: Assembly, scene: scenes.Scene, goals: Array, L: Array, play_m
 
 def beyond(seen: Observation, goals: Array) -> float:
     """How far the worst vertex is out of the interval that is asked, [m]."""
-    system = contact_equations(seen.assembly, seen.start, seen.poses)
+    system = build_contact_equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e = system.residual(goals)
@@ -56,8 +56,8 @@ def unbalanced(seen: Observation, goals: Array) -> float:
     L = np.linalg.cholesky(seen.covariance)
     xi = pose.log(pose.inverse(seen.poses) @ goals)
     z = correction(seen.poses, goals, np.asarray(L, dtype=np.float64))
-    B = right_jacobian(xi) @ L
-    system = contact_equations(seen.assembly, seen.start, seen.poses)
+    B = compute_right_jacobian(xi) @ L
+    system = build_contact_equations(seen.assembly, seen.start, seen.poses)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e, J = system.linearise(goals)

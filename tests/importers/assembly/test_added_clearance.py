@@ -8,26 +8,26 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Solid, intrusion, physical_pieces
+from apo_bench.geometry import Solid, measure_intrusion, shrink_pieces
 from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import scenario_text, write_scenario
 from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft
+from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft
 from tests.importers.assembly.test_blocked import FLOOR, made
 
-SLOTTED = join(FLOOR, *(extrude(rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
+SLOTTED = join(FLOOR, *(extrude(make_rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
 
 
 def slotted(folder: Path, thick: float) -> tuple[PosedPart, ...]:
     """A tongue on the floor of a slot that is 20 mm wide."""
-    tongue = extrude(rectangle(thick, 30), 0, 35, bottom="foot", top="head")
+    tongue = extrude(make_rectangle(thick, 30), 0, 35, bottom="foot", top="head")
     return made(folder, base=(SLOTTED, (0, 0, 0)), tongue=(tongue, (0, 0, 10)))
 
 
 def width(solid: Solid, clearance_mm: float = 0.0) -> float:
-    pieces = physical_pieces(solid, 1e-3 * clearance_mm)
+    pieces = shrink_pieces(solid, 1e-3 * clearance_mm)
     return 1e3 * float(np.ptp(np.concatenate([piece.corners for piece in pieces])[:, 0]))
 
 
@@ -61,12 +61,12 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
 
 @pytest.mark.parametrize("over", [0.0, 0.05])
 def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
-    plate = extrude(rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
-    parts = made(tmp_path, plate=(plate, (0, 0, 0)), pin=(shaft(4.0 + over, 0, 30, "pin"), (0, 0, 0)))
+    plate = extrude(make_rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
+    parts = made(tmp_path, plate=(plate, (0, 0, 0)), pin=(make_shaft(4.0 + over, 0, 30, "pin"), (0, 0, 0)))
     (_, pin), _ = add_clearance(parts, 0.25)
     assert pin.fit == {"pin": pytest.approx(over, abs=1e-5)}
     assert pin.solid.rounds["pin"].radius == pytest.approx(4e-3, abs=1e-8)
-    assert intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
+    assert measure_intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
 
 
 @pytest.mark.parametrize(

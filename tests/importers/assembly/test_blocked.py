@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import pose
-from apo_bench.importers.assembly.new_scenario import NoOrder
+from apo_bench.importers.assembly.new_scenario import NoAssemblyOrder
 from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import scenario_text
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.making import Body, extrude, join, rectangle, write_part
+from apo_bench.scenario.parts.making import Body, extrude, join, make_rectangle, write_part
 
 
 def made(folder: Path, **bodies: tuple[Body, tuple[float, float, float]]) -> tuple[PosedPart, ...]:
@@ -33,17 +33,19 @@ def turned(parts: tuple[PosedPart, ...], *turn: float) -> tuple[PosedPart, ...]:
 
 def box(low: float, high: float) -> Body:
     """Walls of 10 mm around a room of 30 x 30 mm."""
-    sides = [rectangle(50, 10, (0, 20 * s)) for s in (-1, 1)] + [rectangle(10, 30, (20 * s, 0)) for s in (-1, 1)]
+    sides = [make_rectangle(50, 10, (0, 20 * s)) for s in (-1, 1)] + [
+        make_rectangle(10, 30, (20 * s, 0)) for s in (-1, 1)
+    ]
     return join(*(extrude(side, low, high) for side in sides))
 
 
-FLOOR = extrude(rectangle(50, 50), 0, 10, bottom="bottom", top="top")
-CORE = extrude(rectangle(20, 20), 0, 15, bottom="foot", top="head")
+FLOOR = extrude(make_rectangle(50, 50), 0, 10, bottom="bottom", top="top")
+CORE = extrude(make_rectangle(20, 20), 0, 15, bottom="foot", top="head")
 
 
 def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None:
-    shut = join(FLOOR, box(10, 40), extrude(rectangle(50, 50), 40, 48))
-    with pytest.raises(NoOrder, match=r"'core' cannot leave shut"):
+    shut = join(FLOOR, box(10, 40), extrude(make_rectangle(50, 50), 40, 48))
+    with pytest.raises(NoAssemblyOrder, match=r"'core' cannot leave shut"):
         new_upright_scenario(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
 
 
@@ -52,7 +54,7 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     parts = made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10)))
     assert new_upright_scenario(parts).up == "z"
     over = turned(parts, 180, 0, 0)
-    with pytest.raises(NoOrder, match="'core' cannot leave cup"):
+    with pytest.raises(NoAssemblyOrder, match="'core' cannot leave cup"):
         new_upright_scenario(over, "z", ("cup",))
     found = new_upright_scenario(over, fixed=("cup",))
     assert found.up.startswith("-z, as with z up there is no order")
@@ -64,7 +66,7 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
 def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_the_largest(tmp_path: Path) -> None:
     cup = join(FLOOR, box(10, 25))
     over = turned(made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10))), 180, 0, 0)
-    with pytest.raises(NoOrder):
+    with pytest.raises(NoAssemblyOrder):
         new_upright_scenario(over, "z", ("cup",))
     found = new_upright_scenario(over, "z")
     assert found.fixed == ("core",)
@@ -75,7 +77,7 @@ def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_t
 def test_what_only_touches_upright_walls_is_not_carried(tmp_path: Path) -> None:
     # A plate on the side of a block, above the table by less than it may fall: nothing but screws would hold it.
     block = box(0, 30)
-    plate = extrude(rectangle(10, 40), 0.4, 30)
+    plate = extrude(make_rectangle(10, 40), 0.4, 30)
     parts = made(tmp_path, block=(block, (0, 0, 0)), plate=(plate, (30, 0, 0)))
-    with pytest.raises(NoOrder, match="'plate' would only touch upright walls of block, so nothing carries it"):
+    with pytest.raises(NoAssemblyOrder, match="'plate' would only touch upright walls of block, so nothing carries it"):
         new_upright_scenario(parts, "z", ("block",))

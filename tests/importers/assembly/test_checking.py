@@ -15,7 +15,7 @@ from apo_bench.importers.assembly.posed import on_the_table
 from apo_bench.importers.assembly.touching import find_clashes
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.making import bore, extrude, join, rectangle, shaft
+from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made
 
 
@@ -23,8 +23,8 @@ from tests.importers.assembly.test_new_scenario import at, made
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Part files, and a scenario of a cube that is put on a plate."""
     folder = tmp_path_factory.mktemp("cube")
-    plate = extrude(rectangle(80, 60), 0, 15, bottom="bottom", top="top")
-    cube = extrude(rectangle(30, 30), 0, 30, bottom="bottom", top="top")
+    plate = extrude(make_rectangle(80, 60), 0, 15, bottom="bottom", top="top")
+    cube = extrude(make_rectangle(30, 30), 0, 30, bottom="bottom", top="top")
     places = {"plate": ("plate", at(0, 0, 0)), "cube": ("cube", at(0, 0, 15))}
     pile = new_scenario(on_the_table(made(folder, {"plate": plate, "cube": cube}, places)))
     write_scenario(pile, folder / "own.toml", "own", "a test")
@@ -73,8 +73,8 @@ def test_a_screw_is_known_by_its_name(folder: Path) -> None:
 
 
 def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path: Path) -> None:
-    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
-    thin = shaft(1.5, 0, 90, "side", bottom="tip", top="head")
+    hole = extrude(make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
+    thin = make_shaft(1.5, 0, 90, "side", bottom="tip", top="head")
     places = {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     path = tmp_path / "own.toml"
     tall = new_scenario(on_the_table(made(tmp_path, {"plate": hole, "thin": thin}, places)))
@@ -88,11 +88,11 @@ def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path
 
 
 def test_a_wall_on_either_side_without_play_is_found(tmp_path: Path) -> None:
-    walls = [extrude(rectangle(10, 40, (x, 0)), 0, 40, bottom=f"b{k}") for k, x in enumerate((-15.0, 15.0))]
-    floor = extrude(rectangle(40, 40), -10, 0, bottom="bottom")
+    walls = [extrude(make_rectangle(10, 40, (x, 0)), 0, 40, bottom=f"b{k}") for k, x in enumerate((-15.0, 15.0))]
+    floor = extrude(make_rectangle(40, 40), -10, 0, bottom="bottom")
     parts = made(
         tmp_path,
-        {"slot": join(floor, *walls), "key": extrude(rectangle(20, 20), 0, 60, bottom="foot", top="head")},
+        {"slot": join(floor, *walls), "key": extrude(make_rectangle(20, 20), 0, 60, bottom="foot", top="head")},
         {"slot": ("slot", at(0, 0, 10)), "key": ("key", at(0, 0, 10))},
     )
     notes = new_scenario(on_the_table(parts)).notes

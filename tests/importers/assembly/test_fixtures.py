@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.geometry import Array, Solid, extent, intrusion_depths, pose
+from apo_bench.geometry import Array, Solid, measure_extent, measure_intrusion_depths, pose
 from apo_bench.importers.assembly.fixtures import FLOOR_M, fixture_xml, make_fixture
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.making import extrude, polygon, rectangle, shaft, solid_of
+from apo_bench.scenario.parts.making import build_solid, extrude, make_polygon, make_rectangle, make_shaft
 
-BLADE = solid_of("blade", extrude(rectangle(1.4, 40), 0, 50))
+BLADE = build_solid("blade", extrude(make_rectangle(1.4, 40), 0, 50))
 PARTS = {
-    "leaning bar": (solid_of("bar", extrude(rectangle(30, 20), 0, 18)), (0, 30, 0)),
-    "leaning pin": (solid_of("pin", shaft(7, 0, 50, "side")), (0, 25, 0)),
-    "lying pin": (solid_of("pin", shaft(7, 0, 50, "side")), (0, 90, 0)),
+    "leaning bar": (build_solid("bar", extrude(make_rectangle(30, 20), 0, 18)), (0, 30, 0)),
+    "leaning pin": (build_solid("pin", make_shaft(7, 0, 50, "side")), (0, 25, 0)),
+    "lying pin": (build_solid("pin", make_shaft(7, 0, 50, "side")), (0, 90, 0)),
     "angle": (
-        solid_of("angle", extrude(polygon((0, 0), (40, 0), (40, 10), (10, 10), (10, 34), (0, 34)), 0, 20)),
+        build_solid("angle", extrude(make_polygon((0, 0), (40, 0), (40, 10), (10, 10), (10, 34), (0, 34)), 0, 20)),
         (-90, 0, 0),
     ),
     "blade": (BLADE, (0, 0, 0)),
@@ -30,14 +30,14 @@ def in_fixture(name: str) -> tuple[Solid, Solid, Array]:
     solid, turn = PARTS[name]
     T = pose.at(np.zeros(3), turn)
     fixture = make_fixture("fixture", solid, T[:3, :3])
-    return solid, fixture, pose.at((0.0, 0.0, FLOOR_M - extent(solid.pieces, T[2, :3])[0])) @ T
+    return solid, fixture, pose.at((0.0, 0.0, FLOOR_M - measure_extent(solid.pieces, T[2, :3])[0])) @ T
 
 
 @pytest.mark.parametrize("name", PARTS)
 def test_a_part_rests_in_its_fixture_and_is_lifted_straight_out_of_it(name: str):
     solid, fixture, T = in_fixture(name)
     lifts = np.outer(np.linspace(-2e-5, 0.08, 400), (0.0, 0.0, 1.0))
-    depths = intrusion_depths(solid.pieces, T[:3, :3], T[:3, 3] + lifts, fixture.pieces, np.eye(4))
+    depths = measure_intrusion_depths(solid.pieces, T[:3, :3], T[:3, 3] + lifts, fixture.pieces, np.eye(4))
     assert depths[0] > 1e-6  # it would be in it a hair lower
     assert depths[lifts[:, 2] >= 0.0].max() <= 1e-9
 
@@ -51,9 +51,9 @@ def test_the_file_of_a_fixture_is_a_part(name: str, tmp_path: Path):
 
 
 def test_only_what_columns_do_not_carry_stands_between_walls():
-    low, high = (extent(in_fixture("blade")[1].pieces, np.eye(3)[0])[i] for i in (0, 1))
+    low, high = (measure_extent(in_fixture("blade")[1].pieces, np.eye(3)[0])[i] for i in (0, 1))
     assert high - low == pytest.approx(0.0014 + 2 * 0.00515)
     solid, fixture, T = in_fixture("leaning bar")
-    inside, whole = extent(fixture.pieces, np.eye(3)[0]), extent(solid.pieces, T[0, :3])
+    inside, whole = measure_extent(fixture.pieces, np.eye(3)[0]), measure_extent(solid.pieces, T[0, :3])
     assert whole[0] < inside[0] - 0.002
     assert inside[1] + 0.002 < whole[1]

@@ -15,7 +15,17 @@ from apo_bench.importers.assembly.posed import PosedPart, on_the_table
 from apo_bench.importers.assembly.touching import find_clashes
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.making import Body, bore, circle, extrude, join, polygon, rectangle, shaft, write_part
+from apo_bench.scenario.parts.making import (
+    Body,
+    bore,
+    extrude,
+    join,
+    make_circle,
+    make_polygon,
+    make_rectangle,
+    make_shaft,
+    write_part,
+)
 
 
 def made(folder: Path, bodies: dict[str, Body], places: dict[str, tuple[str, np.ndarray]]) -> tuple[PosedPart, ...]:
@@ -32,10 +42,10 @@ def at(x: float, y: float, z: float, *turn: float) -> np.ndarray:
 
 def plate(thick: float, radius: float) -> Body:
     bores = [bore((x, 0), radius, 0, thick, f"bore_{i}") for i, x in enumerate((-25, 25), start=1)]
-    return extrude(rectangle(80, 50), 0, thick, bores=bores, bottom="bottom", top="top")
+    return extrude(make_rectangle(80, 50), 0, thick, bores=bores, bottom="bottom", top="top")
 
 
-PIN = shaft(4, 0, 40, "side", bottom="tip", top="head")
+PIN = make_shaft(4, 0, 40, "side", bottom="tip", top="head")
 
 
 def covered(folder: Path, off_mm: float) -> tuple[PosedPart, ...]:
@@ -85,11 +95,11 @@ def test_the_order_is_as_asked_where_that_can_be(tmp_path: Path) -> None:
 
 def test_what_is_blocked_where_it_goes_is_put_together_beside_the_assembly(tmp_path: Path) -> None:
     """A bar in the window of a frame, which stands between two walls that close the window."""
-    window = rectangle(30.5, 16.5, (0, 25), names=("low", "right", "high", "left"))
-    frame = extrude(rectangle(60, 60, (0, 30)), -15, 15, holes=[window]).moved(turn_deg=(90, 0, 0))
-    floor = extrude(rectangle(80, 90), 0, 10, bottom="bottom")
-    walls = [extrude(rectangle(80, 20, (0, 30 * s)), 10, 60) for s in (-1, 1)]
-    bar = extrude(rectangle(30, 28), 0, 16, bottom="bottom", top="top")
+    window = make_rectangle(30.5, 16.5, (0, 25), names=("low", "right", "high", "left"))
+    frame = extrude(make_rectangle(60, 60, (0, 30)), -15, 15, holes=[window]).moved(turn_deg=(90, 0, 0))
+    floor = extrude(make_rectangle(80, 90), 0, 10, bottom="bottom")
+    walls = [extrude(make_rectangle(80, 20, (0, 30 * s)), 10, 60) for s in (-1, 1)]
+    bar = extrude(make_rectangle(30, 28), 0, 16, bottom="bottom", top="top")
     parts = made(
         tmp_path,
         {"channel": join(floor, *walls), "frame": frame, "bar": bar},
@@ -116,8 +126,8 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
     )
     with pytest.raises(RuntimeError, match="a press fit or a thread"):
         new_scenario(on_the_table(tight))
-    thin = shaft(1.5, 0, 90, "side", bottom="tip", top="head")
-    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
+    thin = make_shaft(1.5, 0, 90, "side", bottom="tip", top="head")
+    hole = extrude(make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
     tall = made(
         tmp_path, {"plate": hole, "thin": thin}, {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     )
@@ -126,8 +136,8 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
 
 
 def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: Path) -> None:
-    floor = extrude(rectangle(90, 60), 0, 10, bottom="bottom", top="top")
-    cube = extrude(rectangle(20, 20), 0, 30, bottom="bottom", top="top")
+    floor = extrude(make_rectangle(90, 60), 0, 10, bottom="bottom", top="top")
+    cube = extrude(make_rectangle(20, 20), 0, 30, bottom="bottom", top="top")
     places = {
         "floor": ("floor", at(0, 0, 0)),
         "left": ("cube", at(-15, 0, 10)),
@@ -138,15 +148,15 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     assert last is not None
     assert abs(last.across[1]) == pytest.approx(1.0)
 
-    slot = polygon((-30, 0), (30, 0), (30, 20), (10, 20), (10, 8), (-10, 8), (-10, 20), (-30, 20))
+    slot = make_polygon((-30, 0), (30, 0), (30, 20), (10, 20), (10, 8), (-10, 8), (-10, 20), (-30, 20))
     rail = extrude(slot, -25, 25, bottom="front", top="back").moved(turn_deg=(90, 0, 0))
-    key = extrude(rectangle(19.4, 50), 0, 20, bottom="bottom", top="top")
+    key = extrude(make_rectangle(19.4, 50), 0, 20, bottom="bottom", top="top")
     flush = {"rail": ("rail", at(0, 0, 0)), "key": ("key", at(0, 0, 8))}
     (grasp,) = loaded(made(tmp_path, {"rail": rail, "key": key}, flush), tmp_path).grasps
     assert abs(grasp.across[0]) == pytest.approx(1.0)  # across its ends, fingers would go down flush with the rail's
     assert grasp.point[2] - 0.010 > 0.012  # and else they would stand on its walls
-    hole = extrude(rectangle(60, 60), 0, 20, holes=[rectangle(21, 21)], bottom="bottom", top="top")
-    low = extrude(rectangle(20, 20), 0, 20, bottom="bottom", top="top")
+    hole = extrude(make_rectangle(60, 60), 0, 20, holes=[make_rectangle(21, 21)], bottom="bottom", top="top")
+    low = extrude(make_rectangle(20, 20), 0, 20, bottom="bottom", top="top")
     sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
     assert any(
         "stand out higher" in note
@@ -155,9 +165,9 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
 
 
 def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
-    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 4.3, 12, 20, "bore")], bottom="bottom", top="top")
+    hole = extrude(make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 4.3, 12, 20, "bore")], bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "pin": ("pin", at(0, 0, 12))}
-    pin = shaft(4, 0, 12, "side", bottom="tip", top="head")
+    pin = make_shaft(4, 0, 12, "side", bottom="tip", top="head")
     found = new_scenario(on_the_table(made(tmp_path, {"base": hole, "pin": pin}, places)))
     assert not found.notes
     grasp = found.grasps["pin"]
@@ -166,8 +176,8 @@ def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
 
 
 def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
-    base = extrude(rectangle(60, 60), 0, 20, bottom="bottom", top="top")
-    bar = extrude(rectangle(100, 20), 0, 10, bottom="bottom", top="top")
+    base = extrude(make_rectangle(60, 60), 0, 20, bottom="bottom", top="top")
+    bar = extrude(make_rectangle(100, 20), 0, 10, bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on base"):
         new_scenario(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
@@ -207,9 +217,9 @@ def test_parts_that_are_as_deep_in_each_other_as_a_new_scenario_allows_are_loade
     tmp_path: Path, deep_mm: float, is_loaded: bool
 ) -> None:
     bodies = {
-        "floor": extrude(rectangle(80, 80), 0, 10),
-        "block": extrude(rectangle(20, 20), 0, 30),
-        "edge": extrude(polygon((0, 0), (20, -10), (20, 10)), 0, 30),
+        "floor": extrude(make_rectangle(80, 80), 0, 10),
+        "block": extrude(make_rectangle(20, 20), 0, 30),
+        "edge": extrude(make_polygon((0, 0), (20, -10), (20, 10)), 0, 30),
     }
     places = {"floor": at(0, 0, 0), "block": at(-10, 0, 10), "edge": at(-deep_mm, 0, 10)}
     parts = on_the_table(made(tmp_path, bodies, {name: (name, T) for name, T in places.items()}))
@@ -223,9 +233,9 @@ def test_parts_that_are_as_deep_in_each_other_as_a_new_scenario_allows_are_loade
 
 def test_a_tube_in_a_pit_of_a_boss_is_pressed_into_nothing(tmp_path: Path) -> None:
     """Its bore is narrower than the boss around it, on one axis with it and at one height."""
-    boss = extrude(circle(5), 10, 20, bores=[bore((0, 0), 4.5, 15, 20, "pit")])
-    tube = extrude(circle(4), 16, 30, bores=[bore((0, 0), 2.65, 16, 30, "bore")])
-    bodies = {"base": join(extrude(rectangle(80, 80), 0, 10), boss), "tube": tube}
+    boss = extrude(make_circle(5), 10, 20, bores=[bore((0, 0), 4.5, 15, 20, "pit")])
+    tube = extrude(make_circle(4), 16, 30, bores=[bore((0, 0), 2.65, 16, 30, "bore")])
+    bodies = {"base": join(extrude(make_rectangle(80, 80), 0, 10), boss), "tube": tube}
     parts = made(tmp_path, bodies, {name: (name, at(0, 0, 0)) for name in bodies})
     solids = {part.name: part.solid for part in parts}
     assert any(wall.radius == pytest.approx(0.005) for wall in solids["base"].rounds.values())

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Box, Cylinder, Solid, cylinder_hull, pose
+from apo_bench.geometry import Box, Cylinder, Solid, make_cylinder_hull, pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import on_the_table, read_posed
 from apo_bench.importers.assembly.staging import Stance, find_stance, stage_parts
 from apo_bench.importers.assembly.writing import scenario_text
-from apo_bench.scenario.parts.making import extrude, rectangle, shaft
+from apo_bench.scenario.parts.making import extrude, make_rectangle, make_shaft
 from tests.importers.assembly.test_new_scenario import at, made
 
 
@@ -50,7 +50,7 @@ def test_what_is_heavy_beside_its_foot_does_not_stand() -> None:
 
 def test_a_cylinder_that_lies_stands_only_where_its_middle_is_over_its_line() -> None:
     def lying(x: float) -> Stance:
-        hull = cylinder_hull("p1", Cylinder(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.01, 0.03))
+        hull = make_cylinder_hull("p1", Cylinder(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.01, 0.03))
         return find_stance(Solid("rod", {}, (hull,), np.array([x, 0.0, 0.0]), 1e-5), np.eye(3))
 
     assert lying(0.02) == (pytest.approx(0.01), True, True)
@@ -58,9 +58,9 @@ def test_a_cylinder_that_lies_stands_only_where_its_middle_is_over_its_line() ->
 
 
 def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) -> None:
-    slab = extrude(rectangle(120, 120), 0, 30, bottom="bottom", top="top")
-    lid = extrude(rectangle(110, 110), 0, 30, bottom="bottom", top="top")
-    rod = shaft(6, 0, 50, "side", bottom="tip", top="head")
+    slab = extrude(make_rectangle(120, 120), 0, 30, bottom="bottom", top="top")
+    lid = extrude(make_rectangle(110, 110), 0, 30, bottom="bottom", top="top")
+    rod = make_shaft(6, 0, 50, "side", bottom="tip", top="head")
     places = {"slab": ("slab", at(0, 0, 0)), "lid": ("lid", at(0, 0, 30)), "rod": ("rod", at(0, 25, 66, 90, 0, 0))}
     result = new_scenario(on_the_table(made(tmp_path, {"slab": slab, "lid": lid, "rod": rod}, places)))
     assert "'rod' lies on a round wall at its start and may roll" in result.notes
@@ -74,8 +74,8 @@ def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) ->
 
 
 def test_a_contact_that_no_poses_close_with_the_others_is_left_out_and_said(tmp_path: Path) -> None:
-    foot = extrude(rectangle(30, 40), 0, 20, bottom="bottom", top="top")
-    beam = extrude(rectangle(120, 20), 0, 15, bottom="bottom", top="top")
+    foot = extrude(make_rectangle(30, 40), 0, 20, bottom="bottom", top="top")
+    beam = extrude(make_rectangle(120, 20), 0, 15, bottom="bottom", top="top")
     places = {name: ("foot", at(x, 0, z)) for name, x, z in (("a", -40, 0), ("b", 0, 0), ("c", 40, -0.03))}
     parts = made(tmp_path, {"foot": foot, "beam": beam}, {**places, "beam": ("beam", at(0, 0, 20))})
     result = new_scenario(on_the_table(parts), tuple(places))
@@ -87,7 +87,7 @@ def test_a_contact_that_no_poses_close_with_the_others_is_left_out_and_said(tmp_
 
 
 def test_the_assembly_stands_on_the_table_whichever_axis_looks_up(tmp_path: Path) -> None:
-    block = extrude(rectangle(20, 30), 0, 40, bottom="bottom", top="top")
+    block = extrude(make_rectangle(20, 30), 0, 40, bottom="bottom", top="top")
     parts = made(tmp_path, {"block": block}, {"one": ("block", at(5, 6, 7)), "other": ("block", at(5, 6, 47))})
     for up, axis in {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}.items():
         for sign in (1.0, -1.0):

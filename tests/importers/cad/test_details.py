@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from apo_bench import InputError
 from apo_bench.geometry import Face
 from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.importing import _fault, import_part, raw_solids
+from apo_bench.importers.cad.importing import _fault, import_solid, raw_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
 from apo_bench.scenario.parts import load_part
@@ -96,7 +96,7 @@ def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_pa
     outline = [(-20, -20), (6, -20), (6, -15), (20, -15), (20, 15), (6, 15), (6, 20), (-20, 20)]
     mesh = prism([(float(x), float(y)) for x, y in outline], 20) - rod(4, 20, top=8)
     _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    part = import_part(raw, "a", tmp_path, "a.stl")
+    part = import_solid(raw, "a", tmp_path, "a.stl")
     assert dict(part.refused) == {}
     volume = sum(ConvexHull(1e3 * piece.corners).volume for piece in part.solid.pieces)
     assert volume == pytest.approx(1e9 * part.solid.volume, rel=2e-3)
@@ -105,4 +105,4 @@ def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_pa
 def test_a_part_that_is_too_light_is_refused(tmp_path: Path) -> None:
     _, (raw,) = raw_solids(write_stl(block(2, 2, 2), tmp_path / "a.stl"), "mm")
     with pytest.raises(InputError, match="the part weighs 8e-06 g at 1 kg/m"):
-        import_part(raw, "a", tmp_path, "a.stl", 1.0)
+        import_solid(raw, "a", tmp_path, "a.stl", 1.0)

@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from apo_bench import InputError
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.pieces import cutting
 from tests.importers.cad.made import block, rod, write_stl
 
@@ -25,12 +25,12 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
-    whole = import_part(raw, "whole", tmp_path, "a.stl")
+    whole = import_solid(raw, "whole", tmp_path, "a.stl")
     assert len(whole.solid.rounds) == 6
     assert not whole.cut.filled
     monkeypatch.setattr(cutting, "MOST_PIECES", 130)
     at_the_second = np.array([[10.0, 0.3, 2.0]])
-    part = import_part(raw, "part", tmp_path, "a.stl", others=at_the_second)
+    part = import_solid(raw, "part", tmp_path, "a.stl", others=at_the_second)
     assert len(part.solid.pieces) <= 130
     kept = {(round(1e3 * float(w.point[0])), round(1e3 * w.radius, 2)) for w in part.solid.rounds.values()}
     assert (10, 1.5) in kept
@@ -50,7 +50,7 @@ def test_beside_others_many_holes_are_filled_that_nothing_comes_into(
 ) -> None:
     monkeypatch.setattr(cutting, "_WEDGES", 60)
     _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
-    part = import_part(raw, "part", tmp_path, "a.stl", others=np.array([[10.0, 0.3, 2.0], [20.0, 0.3, 2.0]]))
+    part = import_solid(raw, "part", tmp_path, "a.stl", others=np.array([[10.0, 0.3, 2.0], [20.0, 0.3, 2.0]]))
     kept = {round(1e3 * float(wall.point[0])) for wall in part.solid.rounds.values()}
     assert {10, 20} <= kept
     assert len(kept) == 6 - len(part.cut.filled) <= 3
@@ -67,4 +67,4 @@ def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_re
     both = block(10, 10, 10) + block(30, 5, 5)
     _, (raw,) = raw_solids(write_stl(both, tmp_path / "a.stl"), None)
     with pytest.raises(InputError, match=r"a.stl: the part takes more than 1 convex pieces without its holes"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.importers.assembly.posed import read_posed
-from apo_bench.importers.cad.solids import part_name
+from apo_bench.importers.cad.solids import make_part_name
 from apo_bench.scenario.parts.stated import read_stated_part
 from tests.importers.cad.made import L_SHAPE, block, prism, write_stl
 
@@ -28,13 +28,13 @@ from tests.importers.cad.made import L_SHAPE, block, prism, write_stl
     ],
 )
 def test_names_have_latin_letters_or_a_number(text: str, name: str) -> None:
-    assert part_name(text, ()) == name
+    assert make_part_name(text, ()) == name
 
 
 def test_no_two_parts_have_one_name() -> None:
     used: set[str] = set()
     for text in ("底板", "销钉", "part_3", "轴", "pin", "pin"):
-        used.add(part_name(text, used))
+        used.add(make_part_name(text, used))
     assert used == {"part_1", "part_2", "part_3", "part_4", "pin", "pin_2"}
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from apo_bench import InputError
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.meshes.obj import read_obj
 from apo_bench.importers.cad.meshes.shells import closed_solids
 from tests.importers.cad.made import DOVETAIL, L_SHAPE, T_SHAPE, U_SHAPE, area, prism, write_stl, write_triangles
@@ -46,7 +46,7 @@ def test_concave_caps_give_the_solid_of_the_file(ring: Ring, flats: int, first: 
     path = tmp_path / "a.obj"
     path.write_text(prism_obj(ring, 20.0, first))
     _, (raw,) = raw_solids(path, None)
-    part = import_part(raw, "a", tmp_path, "a.obj")
+    part = import_solid(raw, "a", tmp_path, "a.obj")
     volume = 20.0 * area([*ring])
     assert raw.mesh.volume == pytest.approx(volume, rel=1e-9)
     assert len(part.solid.faces) == len(raw.regions) == flats

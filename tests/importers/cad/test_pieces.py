@@ -11,12 +11,12 @@ from apo_bench.importers.cad.assembled import coming_near, surface_points
 from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.pieces.cutting import cut
 from apo_bench.importers.cad.pieces.refining import depths
-from apo_bench.importers.cad.solids import RawSolid, SolidPlace, mesh_of, name_regions
+from apo_bench.importers.cad.solids import RawSolid, SolidPlace, convert_to_mesh, name_regions
 from tests.importers.cad.made import block, rod
 
 
 def raw_of(name: str, body: Manifold) -> RawSolid:
-    mesh = mesh_of(body)
+    mesh = convert_to_mesh(body)
     return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), name_regions(mesh, find_regions(mesh)))
 
 

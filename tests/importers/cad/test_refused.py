@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from apo_bench import InputError
 from apo_bench.cli.app import main
 from apo_bench.importers.cad import importing
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.moments import solid_moments
 from tests.importers.cad.made import block, rod, write_stl, write_triangles
 
@@ -70,7 +70,7 @@ def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.
     (raw,) = raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
     monkeypatch.setattr(importing, "cut", None)
     with pytest.raises(InputError, match="no face of the part is flat or round"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")
 
 
 def shells(*given: Any) -> Any:
@@ -104,7 +104,7 @@ def test_a_solid_whose_surface_crosses_itself_becomes_no_part(tmp_path: Path) ->
     given[(given == (10, 10, 20)).all(axis=2)] = (0, 0, -10)
     _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
     with pytest.raises(InputError, match="its surface may cross itself"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")
 
 
 def test_what_pieces_leave_out_is_no_matter_of_the_part_up_to_a_hundredth(
@@ -117,10 +117,10 @@ def test_what_pieces_leave_out_is_no_matter_of_the_part_up_to_a_hundredth(
         monkeypatch.setattr(importing, "solid_moments", lambda *of: solid_moments(*of).plus(solid_moments(*of), by))
 
     larger(0.004)
-    assert import_part(raw, "a", tmp_path, "a.stl").solid.volume == pytest.approx(1e-9 * raw.mesh.volume)
+    assert import_solid(raw, "a", tmp_path, "a.stl").solid.volume == pytest.approx(1e-9 * raw.mesh.volume)
     larger(0.02)
     with pytest.raises(InputError, match=r"its convex pieces make no part .a\.toml, volume_mm3"):
-        import_part(raw, "a", tmp_path, "a.stl")
+        import_solid(raw, "a", tmp_path, "a.stl")
 
 
 def test_inside_out_is_turned_and_said(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_triangles_that_look_different_ways_are_refused(tmp_path: Path) -> None:
 def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:
     mesh = block(30, 30, 5, (0, 0, -10)) + Manifold.sphere(10, 32)
     _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    done = import_part(raw, "ball", tmp_path, "a.stl")
+    done = import_solid(raw, "ball", tmp_path, "a.stl")
     assert sum(region.kind == "other" for region in raw.regions) == 1
     assert done.cut.hulls == 1
     assert done.solid.volume * 1e9 == pytest.approx(mesh.volume(), rel=0.1)
@@ -183,13 +183,13 @@ def test_triangles_without_an_area_change_nothing(tmp_path: Path) -> None:
     more = np.array([[a, m, c], [m, k, c], [k, b, c], [a, b, k], [a, k, m]])
     _, (raw,) = raw_solids(write_triangles(np.concatenate([given[1:], more]), tmp_path / "a.stl"), None)
     assert sum(region.kind == "plane" for region in raw.regions) == 6
-    assert dict(import_part(raw, "a", tmp_path, "a.stl").refused) == {}
+    assert dict(import_solid(raw, "a", tmp_path, "a.stl").refused) == {}
 
 
 def test_a_cavity_stays_empty_also_behind_a_round_hole(tmp_path: Path) -> None:
     mesh = block(40, 30, 20) - block(30, 20, 12, (0, 0, 4)) - rod(3, 4, (0, 0, 16))
     _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    done = import_part(raw, "a", tmp_path, "a.stl")
+    done = import_solid(raw, "a", tmp_path, "a.stl")
     pieces = sum(ConvexHull(1e3 * piece.corners).volume for piece in done.solid.pieces)
     assert pieces == pytest.approx(1e9 * done.solid.volume, rel=1e-3)
     assert dict(done.refused) == {}

@@ -14,14 +14,14 @@ from manifold3d import CrossSection, Manifold
 
 from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.meshes.shells import closed_solids
-from apo_bench.importers.cad.solids import Mesh, Region, mesh_of
+from apo_bench.importers.cad.solids import Mesh, Region, convert_to_mesh
 from tests.importers.cad.made import block, prism, rod
 
 
 def found(drawn: Any) -> tuple[Region, ...]:
     """The faces of a solid, once corners in flat pieces are left out."""
     is_body = isinstance(drawn, Manifold)
-    mesh = mesh_of(drawn) if is_body else Mesh(np.asarray(drawn.vertices, dtype=float), np.asarray(drawn.faces))
+    mesh = convert_to_mesh(drawn) if is_body else Mesh(np.asarray(drawn.vertices, dtype=float), np.asarray(drawn.faces))
     (solid,) = closed_solids(Path("a.stl"), "a", mesh)
     return find_regions(solid.mesh)
 

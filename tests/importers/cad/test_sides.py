@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench.importers.cad.importing import import_part, raw_solids
+from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.part_report import part_lines, report_part
 from apo_bench.importers.cad.solids import RawSolid
 from tests.importers.cad.made import write_triangles
@@ -30,7 +30,7 @@ def test_so_many_sides_are_round_and_fewer_are_flat(sides: int, fewest: int, rou
     walls = [region for region in raw.regions if region.is_round]
     assert [(wall.sides, wall.square) for wall in walls] == [(sides, True)] * round_ones
     assert sum(region.kind == "plane" for region in raw.regions) == 2 + sides * (not round_ones)
-    done = import_part(raw, "a", tmp_path, "a.stl", 8000.0)
+    done = import_solid(raw, "a", tmp_path, "a.stl", 8000.0)
     assert dict(done.refused) == {}
     assert len(done.solid.rounds) == round_ones
     volume = np.pi * 25 * 40 if round_ones else sides / 2 * np.sin(2 * np.pi / sides) * 25 * 40

@@ -14,7 +14,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.cad.importing import ImportedPart, import_part, raw_solids
+from apo_bench.importers.cad.importing import ImportedPart, import_solid, raw_solids
 from apo_bench.importers.cad.step.brep import read_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from tests.importers.cad.brep_made import brep_made, write_step
@@ -32,7 +32,7 @@ def imported(shape: Any, folder: Path) -> ImportedPart:
     """In this process, which has read build123d already."""
     path = write_step(shape, folder / "a.step")
     (solid,) = read_solids(path)
-    return import_part(raw_of(path, solid), "a", folder, "a.step", density=8000.0)
+    return import_solid(raw_of(path, solid), "a", folder, "a.step", density=8000.0)
 
 
 @pytest.mark.parametrize("name", KINDS)

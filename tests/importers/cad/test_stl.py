@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.importers.assembly.from_cad import import_assembly
+from apo_bench.importers.assembly.from_cad import import_parts
 from apo_bench.importers.cad.importing import raw_solids
 from tests.importers.cad.made import block, write_stl
 
@@ -70,6 +70,6 @@ def test_a_plate_of_12_cm_without_a_unit_gets_cm_offered(tmp_path: Path, capsys:
         assert main(["part", "import", str(plate), "--out", out, "--unit", unit]) == 0
         assert "WARNING" not in capsys.readouterr().out
     base = write_stl(block(120, 80, 10, (0, 0, -10)), tmp_path / "base.stl")
-    _, lines = import_assembly([base, plate], tmp_path / "parts")
+    _, lines = import_parts([base, plate], tmp_path / "parts")
     assert [line for line in lines if "WARNING" in line and "plate.stl" in line and "--unit cm" in line]
     assert not [line for line in lines if "WARNING" in line and "base.stl" in line]

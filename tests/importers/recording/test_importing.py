@@ -16,7 +16,7 @@ from apo_bench.importers.recording.log_poses import mirror
 from apo_bench.importers.recording.ordering import Stated
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.importers.recording.unplanned import unplanned_recording
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from tests.importers.recording.watched_demonstrations import watch_demonstration
 from tests.recorded import CAMERA, seen
 
@@ -33,7 +33,7 @@ def imported(
 
 
 def goals(name: str) -> np.ndarray:
-    return layout_at(load_scenario(name), 0.1, 0.0, 0.3).poses
+    return place_layout(load_scenario(name), 0.1, 0.0, 0.3).poses
 
 
 @pytest.mark.parametrize("name", [NAME, "carried_bridge"])
@@ -195,7 +195,7 @@ def test_a_part_that_a_hand_held_from_the_first_frame_starts_where_it_is_put_dow
     start = found.observation.start["stick"]
     assert found.arrangement.start_source["stick"] == ("seen" if put_down else "in the hand")
     scenario = load_scenario(NAME)
-    planned = layout_at(scenario, 0, 0, 0, clearance_mm=scenario.clearance_mm).start["stick"]
+    planned = place_layout(scenario, 0, 0, 0, clearance_mm=scenario.clearance_mm).start["stick"]
     assert np.allclose(start[2, 3], planned[2, 3], atol=1e-3)
     assert put_down or np.allclose(start, planned)
 
@@ -203,7 +203,7 @@ def test_a_part_that_a_hand_held_from_the_first_frame_starts_where_it_is_put_dow
 def test_a_fixed_part_is_where_it_was_seen_or_stated_though_the_assembly_stands_elsewhere() -> None:
     name = "peg_in_hole"
     scenario = load_scenario(name)
-    base = layout_at(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm).start["base"]
+    base = place_layout(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm).start["base"]
     tracks = seen(name, 0.3)
     with pytest.raises(InputError, match="no contact fits"):
         imported(tracks, name=name)

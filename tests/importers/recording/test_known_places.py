@@ -10,7 +10,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.importers.recording.averaging import Mean
 from apo_bench.importers.recording.camera_pose import CameraPose, solve_camera
 from apo_bench.importers.recording.contact_fit import contact_fit
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import place_layout
 from tests.recorded import CAMERA
 
 KNOWN = {"a": pose.at((0.1, 0.0, 0.02), (0.0, 0.0, 30.0)), "b": pose.at((-0.1, 0.2, 0.05), (90.0, 0.0, 0.0))}
@@ -48,7 +48,7 @@ def test_places_that_disagree_make_the_camera_unsure() -> None:
 @pytest.mark.parametrize(("up_mm", "tilt_deg"), [(0.0, 0.0), (2.0, 0.0), (0.0, 3.0), (2.0, 3.0)])
 def test_a_contact_is_wrong_by_its_gap_in_mm_and_its_angle_in_degrees(up_mm: float, tilt_deg: float) -> None:
     scenario = load_scenario("block_on_block")
-    layout = layout_at(scenario, 0.1, 0.0, 0.3)
+    layout = place_layout(scenario, 0.1, 0.0, 0.3)
     bottom = pose.at((0.0, 0.0, up_mm * 1e-3)) @ layout.poses[0]
     half = pose.at((0.0, 0.0, scenario.assembly.solids["A"].bounds[0, 2]))
     tilted = bottom @ half @ pose.at((0.0, 0.0, 0.0), (tilt_deg, 0.0, 0.0)) @ pose.inverse(half)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import Array, pose
-from apo_bench.importers.recording.rest_intervals import find_intervals, poses_at
+from apo_bench.importers.recording.rest_intervals import find_intervals, find_rest_poses
 from apo_bench.importers.recording.rests import LEAST_REST_S, find_rests
 from apo_bench.importers.recording.tracks import PoseTrack
 from tests.recorded import RATE_HZ, seen
@@ -52,5 +52,5 @@ def test_an_adjusted_part_stays_and_is_where_it_was_last() -> None:
     intervals = find_intervals("peg", find_rests(track))
     assert [len(each.rests) for each in intervals] == [2]
     for t, frame in ((-1.0, 0), (1.0, 0), (3.0, -1), (9.0, -1)):
-        off = pose.log(pose.inverse(poses_at({"peg": intervals}, t)["peg"]) @ track.T[frame])
+        off = pose.log(pose.inverse(find_rest_poses({"peg": intervals}, t)["peg"]) @ track.T[frame])
         assert np.abs(off[:3]).max() < 1e-4

@@ -12,7 +12,7 @@ from apo_bench.records import TrialConfig
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import part_pose
+from apo_bench.simulation.scene.world import get_part_pose
 from apo_bench.trial.stages import DEMONSTRATION, LAYOUT, scene_of, stream
 from tests.recorded import CAMERA, RATE_HZ
 
@@ -31,7 +31,7 @@ class Watch:
 
     def __call__(self, data: Any) -> None:
         self.t.append(float(data.time))
-        self.T.append({part: part_pose(self.scene.shown, data, part) for part in self.scene.shown.free})
+        self.T.append({part: get_part_pose(self.scene.shown, data, part) for part in self.scene.shown.free})
 
 
 def watch_demonstration(scenario: str, seed: int, noise_level: float) -> tuple[Scene, dict[str, PoseTrack]]:

@@ -16,7 +16,7 @@ from apo_bench import (
     load_scenario,
     run_trial,
 )
-from apo_bench.geometry import Array, pose, symmetries
+from apo_bench.geometry import Array, find_symmetries, pose
 from apo_bench.perception.depth_camera.range_finder import RangeFinder
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.sensor.rays import ModelRays, Sight
@@ -146,7 +146,7 @@ def test_an_operation_that_no_image_shows_is_not_seen() -> None:
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
     shown = watched("stick_in_tower")
     pose_source = range_sensor(scene("stick_in_tower"), shown, 1.0)
-    S = symmetries(shown.demonstration.assembly.solids["stick"])[3]
+    S = find_symmetries(shown.demonstration.assembly.solids["stick"])[3]
     turned = np.array(pose_source.turns)
     turned[2] = turned[2] @ S[:3, :3]
     other = replace(pose_source, turns=turned)

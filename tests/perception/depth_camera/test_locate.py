@@ -9,9 +9,9 @@ import pytest
 
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
-from apo_bench.geometry import Array, pose, symmetries
+from apo_bench.geometry import Array, find_symmetries, pose
 from apo_bench.perception.depth_camera.explained import measure_share
-from apo_bench.perception.depth_camera.fit import PRIOR, Points, covariance, refine
+from apo_bench.perception.depth_camera.fit import PRIOR, Points, covariance, refine_fit
 from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.perception.depth_camera.starts import guess_poses
@@ -108,11 +108,11 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
 def test_exact_points_are_fitted_to_a_tenth_of_a_millimetre_from_some_start(name: str) -> None:
     T = pose.at((0.07, -0.04, 0.06), (0.0, 0.0, 33.0))
     points = points_on(name, T)
-    same = symmetries(SOLIDS[name])
+    same = find_symmetries(SOLIDS[name])
     surface = SURFACES[name]
     begun = guess_poses(surface.corners, points.at, same)
-    fits = refine(surface, points.thinned(600), begun, 0.012, 15)
-    fits = refine(surface, points.thinned(600), fits.T, 0.0015, 40)
+    fits = refine_fit(surface, points.thinned(600), begun, 0.012, 15)
+    fits = refine_fit(surface, points.thinned(600), fits.T, 0.0015, 40)
     best = fits.T[fits.cost.argmin()]
     off = [np.abs(pose.log(pose.inverse(T) @ best @ S)) for S in same]
     assert min(max(xi[:3].max() / 1e-4, xi[3:].max() / np.radians(0.1)) for xi in off) < 1.0
@@ -132,7 +132,7 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
         common = bias * rng.standard_normal(2)[exact.view]
         error = noise * rng.standard_normal(len(exact)) + common
         seen = Points(exact.at + error[:, None] * exact.ray, exact.ray, exact.view)
-        fitted = refine(surface, seen, T[None], 3e-3, 15).T[0]
+        fitted = refine_fit(surface, seen, T[None], 3e-3, 15).T[0]
         xi[i] = pose.log(pose.inverse(T) @ fitted)
         z[i] = xi[i] @ np.linalg.solve(covariance(surface, seen, fitted, 3e-3, noise, bias), xi[i])
     assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4

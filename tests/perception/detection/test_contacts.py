@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, Observation, correct, detect_contacts, draw_layout, load_scenario
-from apo_bench.assembly import Contact, Facing, Operation, placements
+from apo_bench.assembly import Contact, FacingPair, Operation, compute_placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.perception.detection.belief import Belief, initial_belief
 from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, slack
 from apo_bench.perception.observation.models.displacement import floor_covariance
-from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.file import list_scenario_names
 from apo_bench.trial.detected_contacts import count_contacts, with_detected_contacts
 from tests import scenes
 
@@ -72,7 +72,7 @@ def test_every_contact_is_recognised_and_no_other(name: str, noise_level: float)
         )
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", list_scenario_names())
 def test_scenarios_of_the_package_are_recognised_with_their_own_play(name: str) -> None:
     """Layouts as they are drawn; physics is left to the benchmark."""
     scenario = load_scenario(name)
@@ -167,10 +167,10 @@ def test_contacts_are_counted_against_the_right_ones() -> None:
     }
 
 
-def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, Facing]]:
+def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, FacingPair]]:
     """Faces that look at each other, between all parts at the end of a noisy demonstration."""
     goals = scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)
-    at = placements(scene.assembly, scene.start, goals)[-1]
+    at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     return [
         (a, b, pair)
@@ -187,7 +187,7 @@ def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
     """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
     scene = scenes.ALL[name]()
     goals = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
-    at = placements(scene.assembly, scene.start, goals)[-1]
+    at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     h = 1e-6
     found = pairs(scene, 3)
@@ -204,13 +204,13 @@ def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
             assert (gaps[0] - gaps[1]) / (2 * h) == pytest.approx(pair.slope[0, i], abs=1e-6)
 
 
-def middle_of(pair: Facing, T_a: np.ndarray, corner: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def middle_of(pair: FacingPair, T_a: np.ndarray, corner: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """The point at which the gap is taken, from the derivative -(n, m x n) and the gap itself."""
     n = T_a[:3, :3] @ normal
     return np.cross(n, -pair.slope[0, 3:]) + (n @ pose.apply(T_a, corner)[0] + pair.gap_m) * n
 
 
-def same(pair: Facing, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> Facing:
+def same(pair: FacingPair, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> FacingPair:
     return next(p for p in facing(a, T_a, b, T_b, **WIDE) if (p.a, p.b) == (pair.a, pair.b))
 
 
@@ -223,7 +223,7 @@ def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
     h = 1e-6
     for k in range(len(scene.assembly)):
         now = belief.standing(k)
-        for part, T in placements(scene.assembly, scene.start, belief.poses)[k].items():
+        for part, T in compute_placements(scene.assembly, scene.start, belief.poses)[k].items():
             assert_allclose(now.poses[part], T, rtol=0, atol=1e-12)
         xi = rng.standard_normal(6 * len(belief.poses))
         ends = [

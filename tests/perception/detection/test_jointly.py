@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from apo_bench import Assembly, ContactCorrector, Observation
-from apo_bench.assembly import Contact, Operation, PartFace, contact_equations
-from apo_bench.geometry import Hull, pose, ways_out
-from apo_bench.geometry.penetration import intrusion
+from apo_bench.assembly import Contact, Operation, PartFace, build_contact_equations
+from apo_bench.geometry import Hull, find_ways_out, pose
+from apo_bench.geometry.penetration import measure_intrusion
 from apo_bench.perception.detection.estimate import estimate
 from apo_bench.perception.detection.jointly import detect_contacts_jointly
 from tests import rounds, scenes
@@ -66,7 +66,7 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
         estimated = estimate(seen, scene.assembly, seen.poses)
         corrected = ContactCorrector(compiled=False)(seen)
         assert (
-            np.abs(contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
+            np.abs(build_contact_equations(scene.assembly, seen.start, estimated.poses).residual(estimated.poses)).max()
             < 5e-4
         )
         assert_allclose(estimated.poses, corrected.poses, atol=2e-2)
@@ -154,13 +154,13 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None
         a = replace(a, pieces=tuple(Hull(piece.name, piece.corners) for piece in a.pieces))
     T_a = scenes.mm(45, 3, 26)
     T_b = scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
-    (way,) = ways_out(a, T_a, b, T_b, 1e-4)
+    (way,) = find_ways_out(a, T_a, b, T_b, 1e-4)
     best = int(way.lengths.argmin())
-    assert way.lengths[best] == pytest.approx(intrusion(a, T_a, b, T_b))
+    assert way.lengths[best] == pytest.approx(measure_intrusion(a, T_a, b, T_b))
     for direction, length in zip(way.directions, way.lengths, strict=True):
         out = np.array(T_a)
         out[:3, 3] += (length + 1e-5) * direction
-        assert intrusion(a, out, b, T_b) == 0.0
+        assert measure_intrusion(a, out, b, T_b) == 0.0
 
 
 def test_round_faces_are_recognised_with_flat_ones() -> None:

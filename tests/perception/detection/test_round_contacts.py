@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import detect_contacts
-from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
+from apo_bench.assembly import FacingPair, classify_contact, compute_placements, find_round_pairs, measure_round
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Face, RoundFace, pose
 from apo_bench.perception.detection.thresholds import Rules, pair_thresholds, reality, slack
@@ -57,7 +57,7 @@ def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
 def test_radii_must_fit(radius: float, fits: bool) -> None:
     plate = rounds.plate()
     peg = rounds.peg(radius=radius)
-    pairs = {(a.name, b.name) for a, b in round_pairs(peg, plate)}
+    pairs = {(a.name, b.name) for a, b in find_round_pairs(peg, plate)}
     assert (("wall", "bore") in pairs) is fits
 
 
@@ -78,14 +78,14 @@ class Pair(NamedTuple):
     T_one: Array
     other: Face | RoundFace
     T_other: Array
-    found: Facing
+    found: FacingPair
 
 
 def pairs_of(name: str, turned_deg: float = 1.0) -> list[Pair]:
     """Those that look at each other at the end of a noisy demonstration, in both orders."""
     scene = built(name)
     goals = scenes.noisy(scene.goals, np.random.default_rng(3), 0.5, turned_deg)
-    at = placements(scene.assembly, scene.start, goals)[-1]
+    at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     faces = {part: {**solid.faces, **solid.rounds} for part, solid in solids.items()}
     return [
@@ -132,7 +132,7 @@ COUNTS = {"shaft in hole": (2, 2), "shaft on plane": (1, 1), "cone in cone": (3,
 )
 def test_as_many_numbers_as_equations_and_as_rarely_missed_as_is_said(name: str, kind: str) -> None:
     """Of 20000 residuals drawn from a covariance, as many are beyond the thresholds as `miss` says."""
-    pair = next(p.found for p in pairs_of(name) if contact_kind(p.one, p.other) == kind)
+    pair = next(p.found for p in pairs_of(name) if classify_contact(p.one, p.other) == kind)
     lengths, tilts = COUNTS[kind]
     assert (pair.lengths, len(pair.residual) - pair.lengths, len(pair.half_m)) == (lengths, tilts, tilts)
     sigma = np.array([2e-3] * lengths + [np.radians(1.0)] * tilts)

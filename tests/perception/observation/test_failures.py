@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, draw_layout, load_scenario
-from apo_bench.geometry import approximate_symmetries, pose
+from apo_bench.geometry import find_approximate_symmetries, pose
 from apo_bench.perception.observation.models.failures import PRESETS, CameraFailures, make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
@@ -40,7 +40,7 @@ def test_a_flip_is_by_an_approximate_symmetry():
     flipped = failures("flips", 1, rate=1.0)
     assert flipped.false.all()
     for operation, T, seen in zip(shown.assembly.operations, shown.poses, flipped.poses, strict=True):
-        turns = approximate_symmetries(shown.assembly.solids[operation.main]).turns
+        turns = find_approximate_symmetries(shown.assembly.solids[operation.main]).turns
         assert (np.abs(turns - pose.inverse(T) @ seen).max(axis=(1, 2)) < 1e-9).any()
 
 

@@ -9,20 +9,20 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, Observation, draw_layout, load_scenario, observe
-from apo_bench.geometry import Array, pose, symmetries
+from apo_bench.geometry import Array, find_symmetries, pose
 from apo_bench.perception.observation.models import shared
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.isotropic import FREEDOM, HeavyTailed
+from apo_bench.perception.observation.models.isotropic import FREEDOM, HeavyTailedNoise
 from apo_bench.perception.observation.models.outliers import (
     MISSES,
     OUTLIER_TIMES,
     OUTLIERS,
     UNSEEN_DEVIATION,
-    Outliers,
+    OutlierNoise,
 )
-from apo_bench.perception.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
-from apo_bench.perception.observation.models.sighted import Sighted
-from apo_bench.perception.observation.models.symmetric import WORSE, AnyTurn, Symmetric
+from apo_bench.perception.observation.models.shared import CORRELATION, BiasNoise, CorrelatedNoise, ViewBiasNoise
+from apo_bench.perception.observation.models.sighted import CameraNoise
+from apo_bench.perception.observation.models.symmetric import WORSE, AnyTurnNoise, SymmetricNoise
 from apo_bench.perception.observation.noise import Noise, NoiseLevel
 from tests import scenes
 
@@ -56,7 +56,7 @@ def test_frames_are_turned_the_shortest_way_onto_the_rays() -> None:
 def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     """Positions that were seen, in the frames of the true rays: what the twist does to them is not used."""
     camera = Camera(pose.at((0.5, -0.4, 0.6), (-140.0, 10.0, 50.0)))
-    noise = Sighted(NoiseLevel(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
+    noise = CameraNoise(NoiseLevel(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
     offsets = []
     turns = []
     for seed in range(600):
@@ -72,7 +72,7 @@ def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
 
 def test_what_a_camera_states_follows_from_what_it_saw() -> None:
     """From seen poses alone, so a corrector cannot read the true ray off the covariance."""
-    noise = Sighted(NOISE_LEVEL)
+    noise = CameraNoise(NOISE_LEVEL)
     seen = see(noise, 1)
     sigma = np.array([2e-3 * noise.across] * 2 + [2e-3 * noise.along])
     turn = np.radians(2.0) * np.array([noise.tilt, noise.tilt, noise.about])
@@ -86,10 +86,10 @@ def test_heavy_tails_are_those_of_student() -> None:
     from scipy.stats import f, kstest
 
     sigma = np.repeat([2e-3, np.radians(2.0)], 3)
-    xi = np.concatenate([twists(see(HeavyTailed(NOISE_LEVEL), seed)) for seed in range(300)])
+    xi = np.concatenate([twists(see(HeavyTailedNoise(NOISE_LEVEL), seed)) for seed in range(300)])
     squared = np.sum((xi / sigma) ** 2, axis=1) / 6 * FREEDOM / (FREEDOM - 2)
     assert kstest(squared, f(6, FREEDOM).cdf).pvalue > 1e-3
-    gaussian = np.concatenate([twists(see(HeavyTailed(NOISE_LEVEL, freedom=1e6), seed)) for seed in range(300)])
+    gaussian = np.concatenate([twists(see(HeavyTailedNoise(NOISE_LEVEL, freedom=1e6), seed)) for seed in range(300)])
     assert kstest(np.sum((gaussian / sigma) ** 2, axis=1) / 6, f(6, FREEDOM).cdf).pvalue < 1e-6
 
 
@@ -101,7 +101,7 @@ def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
     gross = []
     seen = []
     for seed in range(trials):
-        made = see(Outliers(NOISE_LEVEL), seed)
+        made = see(OutlierNoise(NOISE_LEVEL), seed)
         rng = np.random.default_rng(seed)
         rng.standard_normal((5, 6))
         gross.append(rng.random((5, 2))[:, 0] < OUTLIERS)
@@ -122,12 +122,12 @@ def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
 
 def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     """Move what is missed elsewhere: the observation stays the same, to the bit."""
-    seed = next(s for s in range(200) if not see(Outliers(NOISE_LEVEL), s).observed.all())
-    here = see(Outliers(NOISE_LEVEL), seed)
+    seed = next(s for s in range(200) if not see(OutlierNoise(NOISE_LEVEL), s).observed.all())
+    here = see(OutlierNoise(NOISE_LEVEL), seed)
     k = int(np.argmin(here.observed))
     goals = CYCLE.goals.copy()
     goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
-    there = see(Outliers(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
+    there = see(OutlierNoise(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.poses.tobytes() == there.poses.tobytes()
     assert_array_equal(here.covariance, there.covariance)
     assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
@@ -136,7 +136,7 @@ def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
 def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shared, "OWN", 0.0)
     for seed in range(20):
-        xi = twists(see(Bias(NOISE_LEVEL), seed))
+        xi = twists(see(BiasNoise(NOISE_LEVEL), seed))
         assert_allclose(xi[CUBE_TWICE[0]], xi[CUBE_TWICE[1]], atol=1e-12)
         assert np.abs(xi[0] - xi[1]).max() > 1e-5
 
@@ -146,7 +146,7 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
     monkeypatch.setattr(shared, "OWN", 0.0)
     size = []
     for seed in range(400):
-        seen = see(BiasView(NOISE_LEVEL), seed)
+        seen = see(ViewBiasNoise(NOISE_LEVEL), seed)
         E = seen.poses @ pose.inverse(CYCLE.goals)
         middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
         assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
@@ -160,7 +160,7 @@ def test_errors_drift_from_operation_to_operation() -> None:
     A = Camera().T_world_camera[:3, :3]
     world = []
     for seed in range(800):
-        seen = see(Correlated(NOISE_LEVEL), seed)
+        seen = see(CorrelatedNoise(NOISE_LEVEL), seed)
         xi = twists(seen)
         R = seen.poses[:, :3, :3]
         world.append(np.concatenate([np.einsum("nij,nj->ni", R, half) @ A for half in (xi[:, :3], xi[:, 3:])], axis=1))
@@ -176,7 +176,7 @@ def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
     """Errors about the centre of volume: castles like isotropic ones, cube and stick worse about x alone."""
     centred = []
     for seed in range(800):
-        xi = twists(see(Symmetric(NOISE_LEVEL), seed))
+        xi = twists(see(SymmetricNoise(NOISE_LEVEL), seed))
         solids = [CYCLE.assembly.solids[o.main] for o in CYCLE.assembly.operations]
         to = np.array([pose.adjoint(pose.inverse(pose.at(solid.centroid))) for solid in solids])
         centred.append((to @ xi[..., None])[..., 0])
@@ -191,10 +191,10 @@ def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_er
     turns = []
     stated = []
     for seed in range(300):
-        seen = see(Symmetric(NoiseLevel(1.0, 40.0)), seed)
+        seen = see(SymmetricNoise(NoiseLevel(1.0, 40.0)), seed)
         off = pose.inverse(CYCLE.goals) @ seen.poses
         for k, operation in enumerate(CYCLE.assembly.operations):
-            equal = off[k] @ symmetries(CYCLE.assembly.solids[operation.main])
+            equal = off[k] @ find_symmetries(CYCLE.assembly.solids[operation.main])
             angles = np.linalg.norm(pose.log(equal)[:, 3:], axis=1)
             assert angles[0] <= angles.min() + 1e-6
         turns.append(pose.log(off)[3, 3:])
@@ -211,7 +211,7 @@ def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated()
     shown = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((n, 6, 6)))
     lengths = []
     for seed in range(300):
-        seen = Symmetric(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
+        seen = SymmetricNoise(NOISE_LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.poses) @ layout.poses)
         lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
     assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)
@@ -221,10 +221,10 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
     """It differs from `symmetric` by symmetries of the parts alone, and every one of them occurs."""
     turns = set()
     for seed in range(120):
-        near = see(Symmetric(NOISE_LEVEL), seed)
-        far = see(AnyTurn(NOISE_LEVEL), seed)
+        near = see(SymmetricNoise(NOISE_LEVEL), seed)
+        far = see(AnyTurnNoise(NOISE_LEVEL), seed)
         for k, operation in enumerate(CYCLE.assembly.operations):
-            group = symmetries(CYCLE.assembly.solids[operation.main])
+            group = find_symmetries(CYCLE.assembly.solids[operation.main])
             off = np.abs(group - pose.inverse(near.poses[k]) @ far.poses[k]).max(axis=(1, 2))
             assert off.min() < 1e-12
             turns.add((operation.main, int(np.argmin(off))))

@@ -16,7 +16,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models import sighted
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
-from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 from apo_bench.perception.observation.noise import FAILURES, NOISES, Noise, NoiseLevel, make_noise
 from tests import scenes
 
@@ -91,7 +91,7 @@ class Cheat:
     skew: float = 0.0
 
     def __call__(self, assembly: Any, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        seen = Isotropic(NOISE_LEVEL)(assembly, shown, rng)
+        seen = IsotropicNoise(NOISE_LEVEL)(assembly, shown, rng)
         sigma = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))
         unit = pose.log(pose.inverse(shown.poses) @ seen.poses) / sigma
         unit = self.factor * unit + self.offset * np.eye(6)[4] + self.skew * np.roll(unit, 1, axis=1)

@@ -18,8 +18,8 @@ from apo_bench.formats.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR
-from apo_bench.perception.observation.models.empirical import Empirical, read_residuals, residuals_text
-from apo_bench.perception.observation.models.fitted import Fitted, restate
+from apo_bench.perception.observation.models.empirical import EmpiricalNoise, read_residuals, residuals_text
+from apo_bench.perception.observation.models.fitted import FittedNoise, restate
 from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -94,11 +94,11 @@ def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> No
 def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names: tuple[str, str]) -> None:
     unit, there = whitened(names[0], 800)
     noise = make_noise(names[0], NOISE_LEVEL)
-    if isinstance(noise, Fitted):
+    if isinstance(noise, FittedNoise):
         missed = noise.measured.missed
         outliers = noise.measured.outliers
     else:
-        assert isinstance(noise, Empirical)
+        assert isinstance(noise, EmpiricalNoise)
         missed = noise.sample.missed
         outliers = noise.sample.gross
         assert_allclose([missed, outliers], [WHOLE.missed, WHOLE.outliers], rtol=0.35)
@@ -114,7 +114,7 @@ def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names:
 
 def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) -> None:
     noise = make_noise(names[0], NOISE_LEVEL)
-    assert isinstance(noise, Fitted | Empirical)
+    assert isinstance(noise, FittedNoise | EmpiricalNoise)
     here = observe(scenes.shown(TOWER), noise, np.random.default_rng(3))
     for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
         turned = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
@@ -214,7 +214,7 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     measured, camera = read_noise(presets()["megapose-lmo"])
     path.write_text(noise_text(measured, ("a note",)) + "[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
     noise = make_noise(str(path), NOISE_LEVEL)
-    assert isinstance(noise, Fitted)
+    assert isinstance(noise, FittedNoise)
     assert noise.measured == measured
     assert_allclose(noise.camera.T_world_camera, pose.at((0, 0, 1.5), (180, 0, 0)))
     assert_allclose(camera.T_world_camera, Camera().T_world_camera)
@@ -226,7 +226,9 @@ def test_the_noise_of_a_file_is_stated_in_place_of_that_of_an_observation() -> N
     stated = restate(seen, measured, camera)
     assert_array_equal(stated.poses, seen.poses)
     assert stated.tails is not None
-    assert_allclose(stated.covariance, camera.covariance(seen.poses, Fitted(measured, NoiseLevel(1.0, 1.0)).covariance))
+    assert_allclose(
+        stated.covariance, camera.covariance(seen.poses, FittedNoise(measured, NoiseLevel(1.0, 1.0)).covariance)
+    )
 
 
 @pytest.mark.parametrize("freedom", ["inf", "1e301"])

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.isotropic import (
-    Isotropic,
-    PerPart,
+    IsotropicNoise,
+    PerPartNoise,
     part_factors,
 )
 from apo_bench.perception.observation.models.sighted import (
@@ -18,7 +18,7 @@ from apo_bench.perception.observation.models.sighted import (
     ALONG_SIGHT,
     IN_IMAGE,
     OUT_OF_IMAGE,
-    Anisotropic,
+    AnisotropicNoise,
     line_of_sight,
 )
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
@@ -42,7 +42,7 @@ def test_draws_differ_along_the_sight_and_across_it() -> None:
     sight = line_of_sight()
     world = []
     for seed in range(1000):
-        seen = see(Anisotropic(NOISE_LEVEL), seed)
+        seen = see(AnisotropicNoise(NOISE_LEVEL), seed)
         R = seen.poses[:, :3, :3]
         xi = twists(seen, TOWER.goals)
         world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
@@ -61,7 +61,7 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
     turned = scenes.turned(TOWER, pose.at((0.3, 0.1, 0.0), (15.0, -40.0, 100.0)))
     worlds = []
     for scene in (TOWER, turned):
-        seen = observe(scenes.shown(scene), Anisotropic(NOISE_LEVEL), np.random.default_rng(4))
+        seen = observe(scenes.shown(scene), AnisotropicNoise(NOISE_LEVEL), np.random.default_rng(4))
         R = np.zeros((len(seen.poses), 6, 6))
         R[:, :3, :3] = R[:, 3:, 3:] = seen.poses[:, :3, :3]
         worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
@@ -71,8 +71,8 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
 
 def test_a_part_is_as_bad_in_every_operation() -> None:
     """The error of each operation is that of `isotropic` times the factor of the part it moves."""
-    plain = see(Isotropic(NOISE_LEVEL), 8)
-    seen = see(PerPart(NOISE_LEVEL), 8)
+    plain = see(IsotropicNoise(NOISE_LEVEL), 8)
+    seen = see(PerPartNoise(NOISE_LEVEL), 8)
     ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)

@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR, floor_covariance
-from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from tests import scenes
 
@@ -24,7 +24,7 @@ def errors(noise_level: NoiseLevel, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
     rng = np.random.default_rng(11)
     demonstration = scenes.shown(TOWER)
-    seen = [Isotropic(noise_level)(demonstration.assembly, demonstration, rng).poses for _ in range(draws)]
+    seen = [IsotropicNoise(noise_level)(demonstration.assembly, demonstration, rng).poses for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 
@@ -55,7 +55,7 @@ def test_what_is_above_the_floor_is_left_alone() -> None:
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
     shown = replace(scenes.shown(TOWER), gap_m=3e-4, play_m=2e-4)
-    seen = observe(shown, Isotropic(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
+    seen = observe(shown, IsotropicNoise(NoiseLevel(1.0, 1.0)), np.random.default_rng(0))
     assert seen.assembly is shown.assembly
     assert dict(seen.start).keys() == dict(shown.start).keys()
     assert seen.observed.tolist() == [True, True, True]
@@ -69,12 +69,12 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
         return scenes.seen(TOWER, shown.poses)
 
-    assert make_noise("isotropic", noise_level) == Isotropic(noise_level)
-    assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", noise_level) == Isotropic(
-        noise_level
-    )
-    assert make_noise(Isotropic, noise_level) == Isotropic(noise_level)
-    assert make_noise(Isotropic(NoiseLevel(9.0, 9.0)), noise_level) == Isotropic(NoiseLevel(9.0, 9.0))
+    assert make_noise("isotropic", noise_level) == IsotropicNoise(noise_level)
+    assert make_noise(
+        "apo_bench.perception.observation.models.isotropic:IsotropicNoise", noise_level
+    ) == IsotropicNoise(noise_level)
+    assert make_noise(IsotropicNoise, noise_level) == IsotropicNoise(noise_level)
+    assert make_noise(IsotropicNoise(NoiseLevel(9.0, 9.0)), noise_level) == IsotropicNoise(NoiseLevel(9.0, 9.0))
     assert make_noise(plain, noise_level) is plain
     assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.goals)
 

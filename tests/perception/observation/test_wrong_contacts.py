@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, InputError, load_scenario
-from apo_bench.assembly import Contact, contact_equations, relation_graph
+from apo_bench.assembly import Contact, build_contact_equations, build_relation_graph
 from apo_bench.perception.observation.wrong_contacts import (
     NEAR_FACES_M,
     TOUCHING_M,
@@ -18,7 +18,7 @@ from apo_bench.perception.observation.wrong_contacts import (
     false,
     make_contacts,
     missed,
-    with_contacts,
+    replace_contacts,
 )
 from apo_bench.trial.stages import CONTACT_SOURCE, stream
 from tests import scenes
@@ -32,7 +32,7 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 
 def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
     """The largest |e| of each contact at the truth, [m]."""
-    return contact_equations(assembly, scene.start, scene.goals).gaps(scene.goals)
+    return build_contact_equations(assembly, scene.start, scene.goals).gaps(scene.goals)
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
@@ -73,7 +73,7 @@ def test_a_false_contact_is_plausible(name: str) -> None:
         before = {part for operation in s.assembly.operations[:made] for part in operation.moves}
         assert contact.manipulated.part in s.assembly.operations[made].moves
         assert contact.environment.part in s.assembly.fixed | before
-        system = contact_equations(wrong, s.start, s.goals)
+        system = build_contact_equations(wrong, s.start, s.goals)
         apart = system.gaps(s.goals)[[r.contact == contact and r.made == made for r in wrong.relations()]]
         assert apart > TOUCHING_M
         if name in ("carried_bridge", "pocket_table"):
@@ -90,7 +90,7 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
             Shifted()(*arguments, stream(seed, CONTACT_SOURCE)),
         ):
             ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
-            (arc,) = [arc for arc in relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
+            (arc,) = [arc for arc in build_relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
             assert culprit(scene.assembly, wrong) == arc.name
     assert culprit(scene.assembly, scene.assembly) is None
 
@@ -112,7 +112,7 @@ def test_relations_change_nothing_but_contacts_and_faces() -> None:
         (replace(scene.assembly, solids={"table": scenes.table()}), "changed parts or operations"),
     ):
         with pytest.raises(InputError) as refused:
-            with_contacts(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
+            replace_contacts(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
         assert words in str(refused.value)
 
 

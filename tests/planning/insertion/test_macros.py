@@ -12,15 +12,15 @@ from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
 from apo_bench.planning.insertion.arrival import Arrival, arrive
 from apo_bench.planning.insertion.attach import Preference
-from apo_bench.planning.insertion.macros import Chain, Way, chain, departure, peel
+from apo_bench.planning.insertion.macros import Chain, StraightExit, chain, departure, peel
 from tests import scenes
 
 X, Y, Z = np.eye(3)
 
 
-def out(along: Array, walls: tuple[int, ...]) -> Way:
+def out(along: Array, walls: tuple[int, ...]) -> StraightExit:
     """Along the first axis there is, a decimetre."""
-    return Way(along[0], 0.1, True)
+    return StraightExit(along[0], 0.1, True)
 
 
 def made(*normals: Array) -> Chain:

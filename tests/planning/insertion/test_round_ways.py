@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly import placements
+from apo_bench.assembly import compute_placements
 from apo_bench.geometry import Array
 from apo_bench.planning.insertion.arrival import Arrival, arrive, turning_state
 from apo_bench.planning.insertion.attach import Preference
@@ -32,7 +32,7 @@ def last_of(made: Scene) -> OperationMacros:
 
 
 def poses_of(made: Scene) -> dict[str, Array]:
-    return dict(placements(made.assembly, made.start, made.goals)[-1])
+    return dict(compute_placements(made.assembly, made.start, made.goals)[-1])
 
 
 def told(found: Arrival) -> list[tuple[str, list[float]]]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Plan
-from apo_bench.assembly import Step, placements
+from apo_bench.assembly import Step, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.failure import Prediction, predict
@@ -105,7 +105,7 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
     goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
     for operation, goal in zip(scene.assembly.operations, goals, strict=True):
         alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
-        (brought,) = placements(alone, poses, goal[None])
+        (brought,) = compute_placements(alone, poses, goal[None])
         rests = resting_poses(alone, operation, brought)
         touched = [c for c in operation.contacts if not alone.is_fit(c)]
         sides = [c for c in touched if not is_support(alone, c, rests)]

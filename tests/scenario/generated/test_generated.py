@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import Demonstration, placements
+from apo_bench.assembly import Demonstration, compute_placements
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.importers.assembly.touching import find_contacts
 from apo_bench.perception.observation.observing import observe
-from apo_bench.scenario import draw_layout, is_named, nominal_operations, scenario_path
-from apo_bench.scenario.generated import FAMILIES, generate_assembly, whole_name, write_generated
+from apo_bench.scenario import draw_layout, find_scenario_path, is_named, list_nominal_operations
+from apo_bench.scenario.generated import FAMILIES, complete_name, generate_assembly, write_generated
 from apo_bench.scenario.parts import load_part
 from apo_bench.trial.pose_error import goal_errors
 
@@ -60,8 +60,8 @@ def test_an_assembly_is_whole(family: str, seed: int) -> None:
 @given(seeds)
 @settings(max_examples=50)
 def test_a_plain_seed_names_one_of_a_family_that_is_not_held_out(seed: int) -> None:
-    name = whole_name(f"generated:{seed}")
-    assert whole_name(name) == name
+    name = complete_name(f"generated:{seed}")
+    assert complete_name(name) == name
     assert FAMILIES[name.split(":")[1]].weight > 0
 
 
@@ -78,17 +78,17 @@ def test_the_same_seed_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
 def test_it_is_a_scenario_by_its_whole_name(scenario: Scenario) -> None:
     assert is_named(scenario.name)
     assert load_scenario(scenario.name) is scenario
-    assert scenario_path(scenario.name).is_file()
+    assert find_scenario_path(scenario.name).is_file()
 
 
 def test_ways_are_free(scenario: Scenario) -> None:
-    assert all(each.after.free for each in nominal_operations(scenario))
+    assert all(each.after.free for each in list_nominal_operations(scenario))
 
 
 def test_its_contacts_are_those_that_touch(scenario: Scenario) -> None:
     """Those that stand at the end are what `drafting` finds there."""
     assembly = scenario.assembly
-    end = placements(assembly, scenario.start, scenario.goals)[-1]
+    end = compute_placements(assembly, scenario.start, scenario.goals)[-1]
     said = {frozenset(each.contact) for each in assembly.relations() if each.lost is None}
     touching = {frozenset(contact) for contact in find_contacts(assembly.solids, end)}
     assert said == {pair for pair in touching if not {each.part for each in pair} <= assembly.fixed}
@@ -98,7 +98,7 @@ def test_contact_corrects_it(scenario: Scenario) -> None:
     assembly = scenario.assembly
     rng = np.random.default_rng(3)
     layout = draw_layout(scenario, rng)
-    final = placements(assembly, layout.start, layout.poses)[-1]
+    final = compute_placements(assembly, layout.start, layout.poses)[-1]
     human_error_scale = np.zeros((len(assembly), 6, 6))
     shown = Demonstration(assembly, layout.start, layout.poses, final, human_error_scale, play_m=2.5e-4)
     seen = observe(shown, "isotropic", rng)
@@ -111,7 +111,7 @@ def test_contact_corrects_it(scenario: Scenario) -> None:
 @pytest.mark.parametrize("name", ["generated:grooves:2", "generated:rods:0", "generated:rods:2", "generated:castles:2"])
 def test_parts_are_as_their_files_say(name: str) -> None:
     """The loader leaves out this check of parts that it has just written."""
-    for path in scenario_path(name).parent.glob("*.xml"):
+    for path in find_scenario_path(name).parent.glob("*.xml"):
         load_part(path)
 
 

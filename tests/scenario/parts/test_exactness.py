@@ -19,17 +19,17 @@ from apo_bench.scenario.parts.making import (
     Edge,
     Frustum,
     bore,
-    circle,
+    build_solid,
     extrude,
-    polygon,
-    rectangle,
+    make_circle,
+    make_polygon,
+    make_rectangle,
+    make_slot,
     revolve,
     round_corners,
-    slot,
-    solid_of,
     write_part,
 )
-from apo_bench.scenario.parts.making.outline import outline_moments, ring
+from apo_bench.scenario.parts.making.outline import outline_moments, trace_outline
 
 FREE_MM = 0.005
 SHARE = 1e-3
@@ -63,14 +63,14 @@ def random_plate(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     corner = rng.uniform(2, 5)
     sides: dict = {}
     if rng.random() < 0.5:
-        outline = rectangle(w, d, names=("ny", "px", "py", "nx"))
+        outline = make_rectangle(w, d, names=("ny", "px", "py", "nx"))
         flats = {"ny": ((0, -1, 0), d / 2), "px": ((1, 0, 0), w / 2), "py": ((0, 1, 0), d / 2)}
         area = w * d - (4 - np.pi) * corner**2
         places = [(x, y) for x in (-w / 4, w / 4) for y in (-d / 4, d / 4)]
     else:
         a = w / 2
         b = d / 2
-        outline = polygon((0, 0), (w, 0), (w, b), (a, b), (a, d), (0, d), names=("foot", "", "ledge", "step"))
+        outline = make_polygon((0, 0), (w, 0), (w, b), (a, b), (a, d), (0, d), names=("foot", "", "ledge", "step"))
         flats = {"foot": ((0, -1, 0), 0.0), "ledge": ((0, 1, 0), b), "step": ((1, 0, 0), a)}
         area = w * b + a * (d - b) - 4 * (4 - np.pi) / 4 * corner**2
         places = [(a / 2, b / 2), (1.5 * a, b / 2), (a / 2, 1.5 * b)]
@@ -119,7 +119,10 @@ def random_slotted(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     width = rng.uniform(4, 8)
     r = rng.uniform(2, 6)
     length = width + rng.uniform(4, 12)
-    holes = [slot(length, width, (0, -12), names=("low", "right", "high", "left")), circle(r, (0, 12), "hole")]
+    holes = [
+        make_slot(length, width, (0, -12), names=("low", "right", "high", "left")),
+        make_circle(r, (0, 12), "hole"),
+    ]
     flat = np.pi * R**2 - (length - width) * width - np.pi * width**2 / 4 - np.pi * r**2
     walls = {
         "rim": ((0, 0), R, 0, h, False),
@@ -127,7 +130,7 @@ def random_slotted(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
         "hole": ((0, 12), r, 0, h, True),
     }
     flats = {"low": ((0, 1, 0), -12 - width / 2), "top": ((0, 0, 1), h)}
-    return extrude(circle(R, name="rim"), 0, h, holes=holes, top="top"), flat * h, walls, flats
+    return extrude(make_circle(R, name="rim"), 0, h, holes=holes, top="top"), flat * h, walls, flats
 
 
 def random_solid(seed: int) -> Wanted:
@@ -173,7 +176,7 @@ def check_walls(solid: Solid, wanted: Wanted) -> None:
 @pytest.mark.parametrize("seed", range(45))
 def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
     wanted = random_solid(seed)
-    solid = solid_of("thing", wanted.body)
+    solid = build_solid("thing", wanted.body)
     if seed % 15 < 1:
         solid = load_part(write_part("thing", wanted.body, tmp_path, source="a test", licence="Apache-2.0"))
     assert 1e9 * solid.volume == pytest.approx(wanted.volume, rel=1e-9)
@@ -191,17 +194,17 @@ def wall_area(wanted: Wanted) -> float:
 def test_the_mesh_of_the_pieces_agrees_with_centroid_and_inertia():
     for seed in range(3):
         wanted = random_solid(seed)
-        check_matter(solid_of("thing", wanted.body), "thing.toml", 1e-3 * FREE_MM * wall_area(wanted))
+        check_matter(build_solid("thing", wanted.body), "thing.toml", 1e-3 * FREE_MM * wall_area(wanted))
 
 
 def test_moments_of_arcs_are_those_of_many_corners():
     for outline in (
-        round_corners(polygon((0, 0), (40, 0), (40, 20), (25, 20), (25, 50), (0, 50)), 4.0),
-        slot(30, 8, (5, -7)),
+        round_corners(make_polygon((0, 0), (40, 0), (40, 20), (25, 20), (25, 50), (0, 50)), 4.0),
+        make_slot(30, 8, (5, -7)),
         [Edge((10, 0), center=(0, 0)), Edge((0, 10), center=(0, 0)), Edge((-10, 0)), Edge((0, -4))],
     ):
         fine = [Edge(e.start, e.name, e.fit, e.center, e.clockwise, 100_000) for e in outline]
-        corners = ring(fine)
+        corners = trace_outline(fine)
         x, y = corners.T
         u, v = np.roll(corners, -1, axis=0).T
         c = x * v - u * y

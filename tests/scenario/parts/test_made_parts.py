@@ -11,7 +11,7 @@ import pytest
 
 from apo_bench.resources import folder
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.making import solid_of
+from apo_bench.scenario.parts.making import build_solid
 
 SCRIPT = folder("assets") / "make_parts.py"
 
@@ -32,7 +32,7 @@ MADE = _script().PARTS
 def test_a_part_file_says_what_the_script_makes(name: str) -> None:
     """To a nanometre: files have a finite number of digits, and other machines round differently."""
     written = load_part(Path(folder("assets") / "parts" / f"{name}.xml"))
-    made = solid_of(name, MADE[name])
+    made = build_solid(name, MADE[name])
     assert set(written.faces) == set(made.faces)
     assert set(written.rounds) == set(made.rounds)
     assert written.volume == pytest.approx(made.volume, rel=1e-6)

@@ -9,40 +9,40 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Box, physical_pieces
+from apo_bench.geometry import Box, shrink_pieces
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
     Body,
     Edge,
     Frustum,
     bore,
+    build_solid,
     extrude,
     join,
-    polygon,
-    rectangle,
+    make_polygon,
+    make_rectangle,
+    make_shaft,
+    make_slot,
     revolve,
     round_corners,
-    shaft,
-    slot,
-    solid_of,
     write_part,
 )
 
 
 def plate() -> Body:
     hole = bore((5, -3), 5.1, 0, 20, "bore", fit=True, chamfer_high=0.5)
-    sides = rectangle(60, 40, names=("ny", "px", "py", "nx"))
+    sides = make_rectangle(60, 40, names=("ny", "px", "py", "nx"))
     return extrude(sides, 0, 20, bores=[hole], bottom="bottom", top="top")
 
 
 def base() -> Body:
     blind = [bore((x, y), 4.05, 5, 15, f"b{i}") for i, (x, y) in enumerate([(-30, 0), (0, 10), (30, 0)])]
     return extrude(
-        rectangle(120, 80),
+        make_rectangle(120, 80),
         0,
         15,
         bores=[*blind, bore((50, 30), 2, 0, 15)],
-        holes=[slot(30, 8, (0, -25), names=("s1", "s2", "s3", "s4"))],
+        holes=[make_slot(30, 8, (0, -25), names=("s1", "s2", "s3", "s4"))],
         top="top",
     )
 
@@ -53,8 +53,8 @@ def bush() -> Body:
 
 
 def pins() -> Body:
-    pin = shaft(4, 10, 20, "pin", chamfer_high=1, top="top")
-    plate = extrude(rectangle(60, 40), 0, 10, top="top")
+    pin = make_shaft(4, 10, 20, "pin", chamfer_high=1, top="top")
+    plate = extrude(make_rectangle(60, 40), 0, 10, top="top")
     return join(plate, *(pin.moved((x, 0, 0)).prefixed(side) for x, side in ((15, "right_"), (-15, "left_"))))
 
 
@@ -64,17 +64,21 @@ BODIES: Mapping[str, Body] = {
     "base": base(),
     "bush": bush(),
     "pins": pins(),
-    "peg": shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
-    "bracket": extrude(round_corners(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
-    "dovetail": extrude(polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40),
+    "peg": make_shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
+    "bracket": extrude(round_corners(make_polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
+    "dovetail": extrude(
+        make_polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40
+    ),
     "taper": revolve([Frustum(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
-    "stairs": join(extrude(rectangle(60, 40), 0, 10, top="tread"), extrude(rectangle(20, 40, (-20, 0)), 10, 30)),
+    "stairs": join(
+        extrude(make_rectangle(60, 40), 0, 10, top="tread"), extrude(make_rectangle(20, 40, (-20, 0)), 10, 30)
+    ),
 }
 
 
 @pytest.mark.parametrize("name", BODIES)
 def test_a_part_that_is_written_is_read_as_the_same_solid(name: str, tmp_path: Path):
-    wanted = solid_of(name, BODIES[name])
+    wanted = build_solid(name, BODIES[name])
     path = write_part(name, BODIES[name], tmp_path, density=2700.0, source="a test", licence="Apache-2.0")
     found = load_part(path)
     assert found.volume == pytest.approx(wanted.volume, rel=1e-9)
@@ -111,7 +115,7 @@ def test_volumes_are_exact():
 
 def test_pieces_keep_a_bore_free_and_leave_no_gap_beside_it():
     middle = np.array([0.005, -0.003])
-    walls = [p.corners[:, :2] - middle for p in solid_of("plate", plate()).pieces]
+    walls = [p.corners[:, :2] - middle for p in build_solid("plate", plate()).pieces]
     near = min(float(np.linalg.norm(corners, axis=1).min()) for corners in walls)
     assert 0.0051 < near < 0.0051 + 6e-6
 
@@ -124,7 +128,7 @@ def free_radius(pieces, middle: np.ndarray) -> float:
 
 
 def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
-    outline = polygon((0, 0), (30, 0), (30, 30), (15, 15.08), (0, 30))
+    outline = make_polygon((0, 0), (30, 0), (30, 30), (15, 15.08), (0, 30))
     body = extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 0, 8, "bore")])
     solid = load_part(write_part("tight", body, tmp_path, source="a test", licence="Apache-2.0"))
     assert list(solid.rounds) == ["bore"]
@@ -136,19 +140,19 @@ def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
 def test_holes_that_meet_are_refused():
     for bores in ([bore((0, 0), 5, 0, 9), bore((9, 0), 5, 0, 9)], [bore((16, 0), 5, 0, 9)]):
         with pytest.raises(ValueError, match="none of which meet"):
-            extrude(rectangle(40, 40), 0, 9, bores=bores)
+            extrude(make_rectangle(40, 40), 0, 9, bores=bores)
     with pytest.raises(ValueError, match="is no arc"):
         extrude([Edge((0, 0)), Edge((10, 0), center=(0, 1)), Edge((10, 10))], 0, 9)
     with pytest.raises(ValueError, match="faces with one name"):
-        solid_of("thing", join(plate(), plate().moved((0, 100, 0))))
+        build_solid("thing", join(plate(), plate().moved((0, 100, 0))))
 
 
 @pytest.mark.parametrize("clearance_mm", [0.05, 0.25])
 def test_bores_and_slots_that_fit_get_wider_by_the_clearance(clearance_mm: float):
-    holes = [slot(20, 8, (0, -20), names=("low", "right", "high", "left"), fit=True)]
+    holes = [make_slot(20, 8, (0, -20), names=("low", "right", "high", "left"), fit=True)]
     hole = bore((0, 10), 5, 0, 12, "bore", fit=True, sides=64)
-    body = extrude(rectangle(60, 70), 0, 12, holes=holes, bores=[hole])
-    made = physical_pieces(solid_of("thing", body), 1e-3 * clearance_mm)
+    body = extrude(make_rectangle(60, 70), 0, 12, holes=holes, bores=[hole])
+    made = shrink_pieces(build_solid("thing", body), 1e-3 * clearance_mm)
     assert free_radius(made, np.array([0.0, 0.010])) == pytest.approx(0.005 + 1e-3 * clearance_mm, abs=1e-8)
     for x in (-0.006, 0.0, 0.006):
         assert free_radius(made, np.array([x, -0.020])) == pytest.approx(0.004 + 1e-3 * clearance_mm, abs=1e-8)

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError, build_scene, load_scenario
-from apo_bench.geometry import Box, face_area, union_mesh
+from apo_bench.geometry import Box, build_union_mesh, measure_face_area
 from apo_bench.resources import folder
-from apo_bench.scenario.parts import load_part, part_names, part_path
+from apo_bench.scenario.parts import find_part_path, list_part_names, load_part
 from apo_bench.scenario.parts.faces import SIDES, unite
 
 SIX = ("px", "nx", "py", "ny", "pz", "nz")
@@ -40,16 +40,16 @@ VOLUME_MM3 = {
 
 
 def test_the_package_has_the_parts_of_the_toy_world_and_those_that_a_script_makes():
-    made = {name for name in part_names() if part_path(name).with_suffix(".toml").exists()}
-    assert set(part_names()) - made == set(NAMED)
+    made = {name for name in list_part_names() if find_part_path(name).with_suffix(".toml").exists()}
+    assert set(list_part_names()) - made == set(NAMED)
 
 
 @pytest.mark.parametrize("name", sorted(NAMED))
 def test_the_faces_close_the_solid(name: str):
     """Areas along opposite directions are equal, and the divergence theorem gives the volume."""
     faces = load_part(name).faces.values()
-    assert np.abs(sum(face_area(f) * f.normal for f in faces)).max() < 1e-12
-    flux = sum(face_area(f) * f.normal @ f.outline[0] for f in faces)
+    assert np.abs(sum(measure_face_area(f) * f.normal for f in faces)).max() < 1e-12
+    flux = sum(measure_face_area(f) * f.normal @ f.outline[0] for f in faces)
     assert flux / 3 == pytest.approx(1e-9 * VOLUME_MM3[name], rel=1e-9)
 
 
@@ -142,7 +142,7 @@ def test_a_mesh_of_the_same_boxes_has_the_same_matter(spans: list[tuple[int, ...
         for size in [(sx, sy, sz)]
     ]
     union = unite(boxes)
-    mesh = union_mesh(boxes)
+    mesh = build_union_mesh(boxes)
     assert mesh.volume == pytest.approx(union.volume, rel=1e-6)
     assert mesh.center_mass == pytest.approx(union.centroid, abs=1e-7)
 
@@ -160,7 +160,7 @@ def with_own_stick(tmp_path: Path, text: str) -> Path:
 
 def test_only_shape_place_and_matter_of_a_part_reach_the_physics(tmp_path: Path):
     """The rest of what MuJoCo understands is the scene's business."""
-    whole = part_path("stick").read_text(encoding="utf-8")
+    whole = find_part_path("stick").read_text(encoding="utf-8")
     more = whole.replace("<geom type", '<geom margin="1" condim="6" solmix="9" priority="7" type')
     more = more.replace("<worldbody>", '<option gravity="0 0 -1" timestep="0.5"/><worldbody>')
     models = [build_scene(load_scenario(with_own_stick(tmp_path, text))).work.model for text in (whole, more)]

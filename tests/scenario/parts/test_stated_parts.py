@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, build_scene, load_scenario
-from apo_bench.geometry import physical_pieces
+from apo_bench.geometry import shrink_pieces
 from apo_bench.resources import folder
-from apo_bench.scenario.parts import load_part, part_names, part_path, read_part
+from apo_bench.scenario.parts import find_part_path, list_part_names, load_part, read_part
 from apo_bench.scenario.parts.checking import check_part
-from apo_bench.scenario.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
+from apo_bench.scenario.parts.making import bore, extrude, join, make_circle, make_rectangle, make_shaft, write_part
 
 MADE = join(
     extrude(
-        rectangle(40, 40, names=("ny", "px", "py", "nx")),
+        make_rectangle(40, 40, names=("ny", "px", "py", "nx")),
         0,
         10,
         bores=[bore((-8, 0), 3, 0, 10, "bore", fit=True)],
         bottom="bottom",
         top="top",
     ),
-    shaft(4, 10, 22, "pin", chamfer_high=1, top="tip").moved((10, 0, 0)),
+    make_shaft(4, 10, 22, "pin", chamfer_high=1, top="tip").moved((10, 0, 0)),
 )
 
 
@@ -145,28 +145,28 @@ def test_a_picture_is_shown_and_never_collides(part: Path, tmp_path: Path) -> No
 def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) -> None:
     """Triangles that fan out from corners of the wall have no side on it; where they are hardly anything of the part,
     they recede to nothing, and the hole gets wider all around."""
-    hole = circle(5, name="bore", sides=64)
-    body = extrude(rectangle(12, 12), 0, 10, holes=[hole])
+    hole = make_circle(5, name="bore", sides=64)
+    body = extrude(make_rectangle(12, 12), 0, 10, holes=[hole])
     marked = replace(body, rounds=tuple(replace(wall, fit=True) for wall in body.rounds))
     assert load_part(write_part("free", body, tmp_path, source="a test", licence="none")).rounds["bore"].hole
     assert "touch it in a corner only" in refusal(write_part("fan", marked, tmp_path, source="a test", licence="none"))
-    large = extrude(rectangle(60, 40), 0, 10, holes=[hole])
+    large = extrude(make_rectangle(60, 40), 0, 10, holes=[hole])
     fitting = replace(large, rounds=tuple(replace(wall, fit=True) for wall in large.rounds))
     solid = load_part(write_part("wide", fitting, tmp_path, source="a test", licence="none"))
-    assert len(physical_pieces(solid, 2.5e-4)) < len(solid.pieces)
-    banded = extrude(rectangle(60, 40), 0, 10, holes=[circle(5, name="bore", sides=64, fit=True)])
+    assert len(shrink_pieces(solid, 2.5e-4)) < len(solid.pieces)
+    banded = extrude(make_rectangle(60, 40), 0, 10, holes=[make_circle(5, name="bore", sides=64, fit=True)])
     assert load_part(write_part("band", banded, tmp_path, source="a test", licence="none")).fits
 
 
-@pytest.mark.parametrize("name", part_names())
+@pytest.mark.parametrize("name", list_part_names())
 def test_parts_of_the_package_are_as_they_say(name: str) -> None:
     """They are not held against their pieces each time that they are loaded."""
-    check_part(read_part(part_path(name)), load_part(name))
+    check_part(read_part(find_part_path(name)), load_part(name))
 
 
 def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_path: Path) -> None:
     for suffix in (".xml", ".toml"):
-        shutil.copy(part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
+        shutil.copy(find_part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
     mine = tmp_path / "mine.xml"
     first = read_part(mine)
     assert read_part(mine) is first

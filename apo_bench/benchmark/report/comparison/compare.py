@@ -7,11 +7,20 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import ALL, Condition, Line, Rate, condition_of, order, tally, tango
+from apo_bench.benchmark.analysis import (
+    ALL,
+    Condition,
+    Line,
+    Rate,
+    compute_tango_interval,
+    get_condition,
+    make_sort_key,
+    tally,
+)
 from apo_bench.benchmark.report.trials import NUMBERS, verdict, why
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.records import KEY, SETTINGS, Key, describe_secret_seed, record_key
+from apo_bench.records import KEY, SETTINGS, Key, describe_secret_seed, get_record_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
 from apo_bench.records.run.trials import Mask, Trials, read_trials
@@ -174,7 +183,7 @@ def _verdicts(x: Array, y: Array) -> Line:
     shared = int((~np.isnan(x) & ~np.isnan(y)).sum())
     first = int(((x == 1) & (y == 0)).sum())
     second = int(((x == 0) & (y == 1)).sum())
-    low, high = tango(second, first, shared)
+    low, high = compute_tango_interval(second, first, shared)
     return {
         "shared": shared,
         "right_in_first_alone": first,
@@ -190,11 +199,11 @@ def _changed(first: Side, second: Side) -> list[Line]:
     unlike = ~_same(first.trials, second.trials, ("success",))
     pairs = zip(first.trials.where(unlike).rows(), second.trials.where(unlike).rows(), strict=True)
     lines = [
-        dict(zip(KEY, record_key(x), strict=True))
-        | {"condition": condition_of(x), "first": _ending(x, first), "second": _ending(y, second)}
+        dict(zip(KEY, get_record_key(x), strict=True))
+        | {"condition": get_condition(x), "first": _ending(x, first), "second": _ending(y, second)}
         for x, y in pairs
     ]
-    return sorted(lines, key=lambda line: (*order(line["condition"]), line["seed"]))
+    return sorted(lines, key=lambda line: (*make_sort_key(line["condition"]), line["seed"]))
 
 
 def _ending(record: Mapping[str, Any], side: Side) -> Line:
@@ -226,9 +235,9 @@ def _number_changes(a: Trials, b: Trials) -> list[Line]:
 def _conditions(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Line]:
     """Conditions of both, whatever the fidelity; sorted as `tally` sorts."""
     ours, theirs = ({_at_any_fidelity(c.condition): c for c in tally(trials)} for trials in (first, second))
-    of: dict[Condition, list[int]] = {condition: [] for condition in sorted({**ours, **theirs}, key=order)}
+    of: dict[Condition, list[int]] = {condition: [] for condition in sorted({**ours, **theirs}, key=make_sort_key)}
     for i, record in enumerate(a.rows()):
-        condition = condition_of(record)
+        condition = get_condition(record)
         assert condition is not None
         of[_at_any_fidelity(condition)].append(i)
     x = a.number("success")

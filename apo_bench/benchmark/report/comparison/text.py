@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.analysis import FEWEST_SEEDS, Interval, Line, percent, percents
+from apo_bench.benchmark.analysis import FEWEST_SEEDS, Interval, Line, format_percent, format_percent_interval
 from apo_bench.benchmark.report.comparison.compare import Comparison
 from apo_bench.benchmark.report.facts import value_words
 from apo_bench.benchmark.report.page.page import Section, page
-from apo_bench.benchmark.report.tables.table import Column, Table, fill
+from apo_bench.benchmark.report.tables.table import Table, TableColumn, fill
 from apo_bench.benchmark.report.trials import NUMBERS
 from apo_bench.errors import InputError
 from apo_bench.io import write_file
@@ -29,59 +29,61 @@ _MOST_LISTED = 2000
 """Changed trials that are listed."""
 _DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
 _WHERE = (
-    Column("scenario", "scenario", "condition.scenario", words=True),
-    Column("conditions", "conditions", "condition.description", words=True),
-    Column("method", "method", "condition.method", words=True),
-    Column("noise_mm", "noise level", "condition.noise_words", words=True),
+    TableColumn("scenario", "scenario", "condition.scenario", words=True),
+    TableColumn("conditions", "conditions", "condition.description", words=True),
+    TableColumn("method", "method", "condition.method", words=True),
+    TableColumn("noise_mm", "noise level", "condition.noise_words", words=True),
 )
 
 
 def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     """By the name of their file: agreements, numbers, conditions, changed trials, differences of the runs."""
     agreement = (
-        Column("scenario", "scenario", words=True),
-        Column("trials", "trials"),
-        Column("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
-        Column("95 %", "95 %", fill(_between("same_verdict"))),
-        Column("seeds", "seeds"),
-        Column("same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")),
-        Column("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
-        Column("same stage and code", "same stage and code", "same_stage_and_code"),
-        Column("right in the first alone", "right in the first alone", "right_in_first_alone"),
-        Column("right in the second alone", "right in the second alone", "right_in_second_alone"),
-        Column("difference of success [points]", "difference of success [points]", _DIFFERENCE),
+        TableColumn("scenario", "scenario", words=True),
+        TableColumn("trials", "trials"),
+        TableColumn("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
+        TableColumn("95 %", "95 %", fill(_between("same_verdict"))),
+        TableColumn("seeds", "seeds"),
+        TableColumn(
+            "same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")
+        ),
+        TableColumn("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
+        TableColumn("same stage and code", "same stage and code", "same_stage_and_code"),
+        TableColumn("right in the first alone", "right in the first alone", "right_in_first_alone"),
+        TableColumn("right in the second alone", "right in the second alone", "right_in_second_alone"),
+        TableColumn("difference of success [points]", "difference of success [points]", _DIFFERENCE),
     )
     numbers = (
-        Column("number", "number", _label, words=True),
-        Column("trials", "trials", "both"),
-        Column("differ", "differ"),
-        Column("largest difference", "largest difference", fill("{most:.3g}")),
-        Column("in one alone", "in one alone", "alone"),
+        TableColumn("number", "number", _label, words=True),
+        TableColumn("trials", "trials", "both"),
+        TableColumn("differ", "differ"),
+        TableColumn("largest difference", "largest difference", fill("{most:.3g}")),
+        TableColumn("in one alone", "in one alone", "alone"),
     )
     conditions = (
         *_WHERE,
-        Column("first", "first", fill("{first.rate:percent}, n {first.trials}")),
-        Column("second", "second", fill("{second.rate:percent}, n {second.trials}")),
-        Column("shared", "shared"),
-        Column("first alone", "first alone", "right_in_first_alone"),
-        Column("second alone", "second alone", "right_in_second_alone"),
-        Column("difference [points]", "difference [points]", _DIFFERENCE),
+        TableColumn("first", "first", fill("{first.rate:percent}, n {first.trials}")),
+        TableColumn("second", "second", fill("{second.rate:percent}, n {second.trials}")),
+        TableColumn("shared", "shared"),
+        TableColumn("first alone", "first alone", "right_in_first_alone"),
+        TableColumn("second alone", "second alone", "right_in_second_alone"),
+        TableColumn("difference [points]", "difference [points]", _DIFFERENCE),
     )
     changed = (
         *_WHERE,
-        Column("seed", "seed", words=True),
-        Column("first", "first", fill("{first.verdict} {first.why}"), words=True),
-        Column("in words", "in words", "first.sentence", words=True),
-        Column("second", "second", fill("{second.verdict} {second.why}"), words=True),
-        Column("in words 2", "in words", "second.sentence", words=True),
-        Column("command of the first", "command of the first", "first.command", words=True),
-        Column("command of the second", "command of the second", "second.command", words=True),
+        TableColumn("seed", "seed", words=True),
+        TableColumn("first", "first", fill("{first.verdict} {first.why}"), words=True),
+        TableColumn("in words", "in words", "first.sentence", words=True),
+        TableColumn("second", "second", fill("{second.verdict} {second.why}"), words=True),
+        TableColumn("in words 2", "in words", "second.sentence", words=True),
+        TableColumn("command of the first", "command of the first", "first.command", words=True),
+        TableColumn("command of the second", "command of the second", "second.command", words=True),
     )
     first, second = (str(side.folder) for side in (comparison.first, comparison.second))
     differences = (
-        Column("what", "what", words=True),
-        Column(first, first, _side("first"), words=True),
-        Column(second, second, _side("second"), words=True),
+        TableColumn("what", "what", words=True),
+        TableColumn(first, first, _side("first"), words=True),
+        TableColumn(second, second, _side("second"), words=True),
     )
     return {
         "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
@@ -106,10 +108,10 @@ def _agreed(total: Line) -> str:
         return "None of them counts: no demonstration was right itself."
     counted = f", {total['excluded_in_one']:,} counted in one of the two alone" * bool(total["excluded_in_one"])
     seeds = Interval(total["same_verdicts_in_all_low_95"], total["same_verdicts_in_all_high_95"])
-    sure = f"95 % interval {percents(seeds)} of seeds"
+    sure = f"95 % interval {format_percent_interval(seeds)} of seeds"
     if total["seeds"] < FEWEST_SEEDS:
         sure = f"too few for an interval: from {FEWEST_SEEDS} on there is one"
-    rate = percent(total["same_verdict_rate"], 2)
+    rate = format_percent(total["same_verdict_rate"], 2)
     return (
         f"Verdicts agree in {total['same_verdict']:,} of {total['trials']:,} ({rate}): "
         f"{total['right_in_first_alone']:,} right in the first alone, {total['right_in_second_alone']:,} in the second "

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from apo_bench.benchmark.report.figures.sheet import Figure, Panel, draw
+from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw
 from apo_bench.benchmark.report.figures.style import COLORS, SOFT
 
 _BAR = 0.2
@@ -26,7 +26,7 @@ def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
     return draw(title, drawn, {part: Patch(color=COLORS.get(part, SOFT)) for part in ordered})
 
 
-def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> Panel:
+def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> FigurePanel:
     names = [name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…" for name in bars]
     totals = [sum(parts.values()) for parts in bars.values()]
 
@@ -43,4 +43,4 @@ def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> Panel:
         axis.set(xlim=(0, 1.2), ylim=(len(bars) - 0.5, -0.5), xlabel="share of trials")
         axis.grid(False)
 
-    return Panel(title, draw_bars, _AROUND + _BAR * len(bars), 0.3 + _LETTER * max(map(len, names)))
+    return FigurePanel(title, draw_bars, _AROUND + _BAR * len(bars), 0.3 + _LETTER * max(map(len, names)))

@@ -8,15 +8,15 @@ from apo_bench.benchmark.analysis import (
     Condition,
     ConditionResult,
     Line,
-    Paired,
-    level_unit,
-    levels_of,
-    members,
-    noise_label,
-    noise_words,
+    PairedComparison,
+    format_noise,
+    format_noise_label,
+    get_level_unit,
+    group_by_setting,
+    list_levels,
 )
 from apo_bench.benchmark.report.figures.bars import Shares, bar_figure
-from apo_bench.benchmark.report.figures.lines import Axes, Mark, line_figure
+from apo_bench.benchmark.report.figures.lines import Axes, IntervalMark, line_figure
 from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.records import knows_truth, may_reobserve
 
@@ -26,7 +26,7 @@ _FLOOR_MM = 1e-3
 
 def figures(
     results: Sequence[ConditionResult],
-    pairs: Sequence[Paired],
+    pairs: Sequence[PairedComparison],
     settings: Sequence[Condition],
     gaps: Sequence[Line],
     confusions: Sequence[Line],
@@ -34,8 +34,8 @@ def figures(
     times: Sequence[Line],
 ) -> dict[str, Figure]:
     """All figures with a panel."""
-    by_setting = members(settings, results)
-    level = "; ".join(dict.fromkeys(level_unit(setting.noise) for setting in settings))
+    by_setting = group_by_setting(settings, results)
+    level = "; ".join(dict.fromkeys(get_level_unit(setting.noise) for setting in settings))
     tightness = Axes("clearance per side over noise level [mm per mm]", "success", "percent")
     lines = {
         "success_over_noise_level": (
@@ -61,7 +61,7 @@ def figures(
         own = [p for p in pairs if p.reference == reference and p.pairs and p.condition.method != "uncorrected"]
         marks = [
             _mark(s, p.condition, p.difference or 0.0, *p.interval)
-            for s, inside in members(settings, own).items()
+            for s, inside in group_by_setting(settings, own).items()
             for p in inside
         ]
         title = f"Difference of success to {reference}, same seeds"
@@ -74,12 +74,12 @@ def figures(
     return drawn | {name: bar_figure(title, panels) for name, (title, panels) in bars.items() if panels}
 
 
-def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[Mark]:
+def _over_level(by_setting: Mapping[Condition, Sequence[ConditionResult]]) -> list[IntervalMark]:
     """A panel for each setting with two noise levels or more; without one, for each setting; the oracle at each."""
-    levels = {s: levels_of(own) for s, own in by_setting.items()}
+    levels = {s: list_levels(own) for s, own in by_setting.items()}
     least = min(2, max(map(len, levels.values()), default=1))
     return [
-        Mark(_title(s, own), c.method, level, noise_words(level, s.noise), c.rate, *c.interval)
+        IntervalMark(_title(s, own), c.method, level, format_noise(level, s.noise), c.rate, *c.interval)
         for s, own in by_setting.items()
         for c in own
         if len(levels[s]) >= max(1, least) and c.rate is not None
@@ -93,10 +93,10 @@ def _title(setting: Condition, results: Sequence[ConditionResult]) -> str:
     return f"{setting.title}; n\u00a0{' to '.join(map(str, dict.fromkeys((min(trials), max(trials)))))}"
 
 
-def _gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[Mark]:
+def _gaps(settings: Sequence[Condition], lines: Sequence[Line]) -> list[IntervalMark]:
     """Observed gaps, which are the same for every method, and planned ones."""
     of = {line["condition"]: line for line in lines}
-    here = [(s, condition) for s, inside in members(settings, list(of)).items() for condition in inside]
+    here = [(s, condition) for s, inside in group_by_setting(settings, list(of)).items() for condition in inside]
     observed = [_mark(s, replace(c, method="observed"), *_percentiles(of[c], "observed")) for s, c in here]
     once = {mark[:3]: mark for mark in observed}
     return [*once.values(), *(_mark(s, c, *_percentiles(of[c], "planned")) for s, c in here)]
@@ -106,14 +106,14 @@ def _percentiles(line: Line, of: str) -> list[float]:
     return [max(line[f"{of}_{name}"], _FLOOR_MM) for name in ("median_mm", "5", "95")]
 
 
-def _detected(lines: Sequence[Line]) -> list[Mark]:
+def _detected(lines: Sequence[Line]) -> list[IntervalMark]:
     """Over all scenarios where there are several."""
     return [
-        Mark(
+        IntervalMark(
             f"{what}; {line['noise']}, human error {line['human_error_scale']:g}",
             line["contact_source"],
             (line["noise_mm"], line["noise_deg"]),
-            noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
+            format_noise_label(line["noise_mm"], line["noise_deg"], line["noise"]),
             *[line[what]] * 3,
         )
         for line in [line for line in lines if line["scenario"] == ALL] or lines
@@ -122,16 +122,16 @@ def _detected(lines: Sequence[Line]) -> list[Mark]:
     ]
 
 
-def _times(lines: Sequence[Line]) -> list[Mark]:
+def _times(lines: Sequence[Line]) -> list[IntervalMark]:
     names = ("trial_median_s", "trial_5_s", "trial_95_s")
-    return [Mark(line["scenario"], *[line["method"]] * 3, *(line[name] for name in names)) for line in lines]
+    return [IntervalMark(line["scenario"], *[line["method"]] * 3, *(line[name] for name in names)) for line in lines]
 
 
-def _over_reobservations(results: Sequence[ConditionResult]) -> list[Mark]:
+def _over_reobservations(results: Sequence[ConditionResult]) -> list[IntervalMark]:
     """All methods, if several numbers were allowed."""
     several = len({c.max_reobservations for c in results if may_reobserve(c.method)}) > 1
     return [
-        Mark(
+        IntervalMark(
             c.setting.with_default("max_reobservations").title,
             f"{c.method}, {c.noise_words}",
             c.max_reobservations,
@@ -144,11 +144,13 @@ def _over_reobservations(results: Sequence[ConditionResult]) -> list[Mark]:
     ]
 
 
-def _over_tightness(results: Sequence[ConditionResult]) -> list[Mark]:
+def _over_tightness(results: Sequence[ConditionResult]) -> list[IntervalMark]:
     """All clearances together, if a scenario has several."""
     several = len({(c.scenario, c.clearance_mm) for c in results}) > len({c.scenario for c in results})
     return [
-        Mark(replace(c.setting, clearance_mm=0.0).title, c.method, c.tightness, f"{c.tightness:g}", c.rate, *c.interval)
+        IntervalMark(
+            replace(c.setting, clearance_mm=0.0).title, c.method, c.tightness, f"{c.tightness:g}", c.rate, *c.interval
+        )
         for c in results
         if several and c.tightness and c.rate is not None and not knows_truth(c.method)
     ]
@@ -181,7 +183,7 @@ def _predicted(lines: Sequence[Line]) -> dict[str, Shares]:
     return {"predicted: result": bars} if bars else {}
 
 
-def _mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> Mark:
+def _mark(setting: Condition, condition: Condition, value: float, low: float, high: float) -> IntervalMark:
     """A value at a noise level."""
     level = (condition.noise_mm, condition.noise_deg)
-    return Mark(setting.title, condition.method, level, noise_words(level, setting.noise), value, low, high)
+    return IntervalMark(setting.title, condition.method, level, format_noise(level, setting.noise), value, low, high)

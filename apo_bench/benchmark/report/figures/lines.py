@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.report.figures.sheet import Figure, Panel, draw
+from apo_bench.benchmark.report.figures.sheet import Figure, FigurePanel, draw
 from apo_bench.benchmark.report.figures.style import Style, styles
-from apo_bench.io import grouped
+from apo_bench.io import group_by
 
 _APART = 0.08
 _WITHIN = 0.4
@@ -15,7 +15,7 @@ _WITHIN = 0.4
 within this part of the way to the next value."""
 
 
-class Mark(NamedTuple):
+class IntervalMark(NamedTuple):
     """A value with its interval, and where it stands."""
 
     panel: str
@@ -38,17 +38,17 @@ class Axes(NamedTuple):
     """`percent` from 0 to 100 %, `points` around a line at 0, `log`, or `plain`."""
 
 
-def line_figure(title: str, marks: Sequence[Mark], axes: Axes) -> Figure:
+def line_figure(title: str, marks: Sequence[IntervalMark], axes: Axes) -> Figure:
     """A panel for each that has marks, and a line in it for each method."""
     looks = styles(list(dict.fromkeys(mark.line for mark in marks)))
-    panels = grouped((mark.panel, mark) for mark in marks)
+    panels = group_by((mark.panel, mark) for mark in marks)
     return draw(title, [_panel(name, own, axes, looks) for name, own in panels.items()], _legend(looks))
 
 
-def _panel(title: str, marks: Sequence[Mark], axes: Axes, looks: dict[str, Style]) -> Panel:
+def _panel(title: str, marks: Sequence[IntervalMark], axes: Axes, looks: dict[str, Style]) -> FigurePanel:
     conditions = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
     labels = {conditions[mark.at]: mark.label for mark in marks}
-    lines = grouped((mark.line, mark) for mark in marks)
+    lines = group_by((mark.line, mark) for mark in marks)
     step = min(_APART, _WITHIN / len(lines))
 
     def draw_lines(axis: Any) -> None:
@@ -60,10 +60,10 @@ def _panel(title: str, marks: Sequence[Mark], axes: Axes, looks: dict[str, Style
         axis.set(xlabel=axes.x, ylabel=axes.y)
         _scale(axis, axes.kind)
 
-    return Panel(title, draw_lines)
+    return FigurePanel(title, draw_lines)
 
 
-def _line(axis: Any, x: Any, marks: Sequence[Mark], style: Style) -> None:
+def _line(axis: Any, x: Any, marks: Sequence[IntervalMark], style: Style) -> None:
     """A line with its band; of a single mark a bar."""
     order = np.argsort(x, kind="stable")
     value, low, high = np.array([mark[-3:] for mark in marks], dtype=float)[order].T

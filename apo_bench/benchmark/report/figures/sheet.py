@@ -30,7 +30,7 @@ _NAMES = 130
 """Letters of a line of the legend, samples included."""
 
 
-class Panel(NamedTuple):
+class FigurePanel(NamedTuple):
     """One drawing with its title."""
 
     title: str
@@ -61,7 +61,7 @@ class Figure:
         return path
 
 
-def draw(title: str, panels: Sequence[Panel], legend: Mapping[str, Any]) -> Figure:
+def draw(title: str, panels: Sequence[FigurePanel], legend: Mapping[str, Any]) -> Figure:
     """Draw every panel.
 
     Args:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from apo_bench.io import default_looks
+from apo_bench.io import use_figure_style
 
 INK = "#1d2430"
 """Of text and lines."""
@@ -92,5 +92,5 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
 @contextmanager
 def report_looks(secret_seed: str) -> Iterator[None]:
     """Matplotlib's own settings but for these; one text as salt gives one file."""
-    with default_looks(_LOOKS | {"svg.hashsalt": secret_seed}):
+    with use_figure_style(_LOOKS | {"svg.hashsalt": secret_seed}):
         yield

@@ -14,14 +14,14 @@ import numpy as np
 from apo_bench.benchmark.analysis import (
     Condition,
     ConditionResult,
-    by_condition,
-    level_of,
-    level_unit,
-    levels_of,
-    noise_words,
+    format_noise,
+    get_level,
+    get_level_unit,
+    group_by_condition,
+    list_levels,
 )
 from apo_bench.benchmark.report.trials import NUMBERS, predicted, verdict, why
-from apo_bench.io import grouped
+from apo_bench.io import group_by
 from apo_bench.records import Limits, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.trials import Trials
@@ -57,16 +57,16 @@ def matrix(setting: Condition, cells: Sequence[ConditionResult], numbers: Mappin
     Args:
         numbers: Condition -> its number among all cells.
     """
-    levels = levels_of(cells)
+    levels = list_levels(cells)
     lines: list[tuple[str, list[Button | None]]] = []
-    for method, own in grouped((c.method, c) for c in cells).items():
-        by_level = {level_of(c): Button(numbers[c.condition], c, 1) for c in own}
+    for method, own in group_by((c.method, c) for c in cells).items():
+        by_level = {get_level(c): Button(numbers[c.condition], c, 1) for c in own}
         across = [by_level.get(level) for level in levels]
         if knows_truth(method):
             across = [Button(numbers[c.condition], c, max(1, len(levels))) for c in own]
         lines.append((method, across))
-    corner = f"method, {level_unit(setting.noise)}" if levels else "method"
-    return Matrix(setting.title, corner, [noise_words(x, setting.noise) for x in levels] or ["any"], lines)
+    corner = f"method, {get_level_unit(setting.noise)}" if levels else "method"
+    return Matrix(setting.title, corner, [format_noise(x, setting.noise) for x in levels] or ["any"], lines)
 
 
 def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[str, int]) -> str:
@@ -75,7 +75,7 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
     Args:
         pictures: `cell:seed` -> number of the picture of that trial.
     """
-    cells = by_condition(trials).values()
+    cells = group_by_condition(trials).values()
     words: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "verdict": verdict,
         "why": why,

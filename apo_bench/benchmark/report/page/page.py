@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from apo_bench.benchmark.analysis import percent, percents
+from apo_bench.benchmark.analysis import format_percent, format_percent_interval
 
 
 class Section(NamedTuple):
@@ -78,7 +78,13 @@ def _template() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"prose": prose, "zip": zip, "svg": _svg, "percent": percent, "percents": percents}
+    environment.filters |= {
+        "prose": prose,
+        "zip": zip,
+        "svg": _svg,
+        "percent": format_percent,
+        "percents": format_percent_interval,
+    }
     return environment.get_template("report.html.j2")
 
 

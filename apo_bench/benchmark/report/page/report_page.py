@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.benchmark.analysis import ConditionResult, condition_of, members, settings
+from apo_bench.benchmark.analysis import ConditionResult, get_condition, group_by_setting, list_settings
 from apo_bench.benchmark.report.facts import run_facts
 from apo_bench.benchmark.report.figures.sheet import Figure
 from apo_bench.benchmark.report.page.matrix import matrix, pack_trials
@@ -57,9 +57,9 @@ class Contents(NamedTuple):
 def report_page(c: Contents) -> str:
     """The page, as HTML."""
     numbers = {result.condition: i for i, result in enumerate(c.results)}
-    shown = [(condition_of(picture.row), picture.row["seed"]) for picture in c.pictures]
+    shown = [(get_condition(picture.row), picture.row["seed"]) for picture in c.pictures]
     pictured = {f"{numbers[condition]}:{seed}": k for k, (condition, seed) in enumerate(shown) if condition in numbers}
-    by_setting = members(settings(c.results), c.results)
+    by_setting = group_by_setting(list_settings(c.results), c.results)
     matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
     over = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations")
@@ -99,7 +99,7 @@ def _pictures(c: Contents) -> list[tuple[str, Any]]:
 
 def _picture(c: Contents, number: int) -> dict[str, str]:
     row, jpeg, words = c.pictures[number]
-    condition = condition_of(row)
+    condition = get_condition(row)
     where = "" if condition is None else f"{condition.title}, noise {condition.noise_mm:g}, "
     return {
         "name": f"picture-{number}",

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, Paired
-from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, endings, interval_columns
+from apo_bench.benchmark.analysis import ConditionResult, HalfLevel, PairedComparison
+from apo_bench.benchmark.report.tables.table import Table, TableColumn, condition_columns, endings, interval_columns
 from apo_bench.records import TrialConfig
 
 _AXES = (
@@ -24,47 +24,47 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
     min_predicted_success = "min_predicted_success" in unusual
     promises = any(c.predicted_success is not None for c in cells)
 
-    def axis(name: str) -> Column:
-        return Column(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
+    def axis(name: str) -> TableColumn:
+        return TableColumn(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
 
     return Table(
         cells,
         (
-            Column("scenario", "scenario", words=True),
-            Column("clearance_mm", "clearance", text="{clearance_mm:g} mm", words=True),
+            TableColumn("scenario", "scenario", words=True),
+            TableColumn("clearance_mm", "clearance", text="{clearance_mm:g} mm", words=True),
             axis("noise"),
             axis("contact_source"),
-            Column("human_error_scale", "human error", text="{words.human_error_scale}", words=True),
-            Column("noise_mm", "noise level", text="{noise_words}", words=True),
-            Column("noise_deg"),
-            Column("tightness"),
-            Column("method", "method", words=True),
-            Column("grasp"),
-            Column("fidelity"),
+            TableColumn("human_error_scale", "human error", text="{words.human_error_scale}", words=True),
+            TableColumn("noise_mm", "noise level", text="{noise_words}", words=True),
+            TableColumn("noise_deg"),
+            TableColumn("tightness"),
+            TableColumn("method", "method", words=True),
+            TableColumn("grasp"),
+            TableColumn("fidelity"),
             *map(axis, _AXES[2:]),
-            Column("", "success", "rate", "{rate:percent}"),
-            Column("", "95 % interval", "interval", "{interval:percents}"),
-            Column("trials", "n"),
-            Column("successes"),
-            Column("rate"),
+            TableColumn("", "success", "rate", "{rate:percent}"),
+            TableColumn("", "95 % interval", "interval", "{interval:percents}"),
+            TableColumn("trials", "n"),
+            TableColumn("successes"),
+            TableColumn("rate"),
             *interval_columns(),
-            Column("executed", value="executed.trials"),
-            Column("executed_rate", value="executed.rate"),
+            TableColumn("executed", value="executed.trials"),
+            TableColumn("executed_rate", value="executed.rate"),
             *interval_columns("executed.interval", "executed_low_95", "executed_high_95"),
-            Column("abstained", "abstained" * min_predicted_success),
-            Column(
+            TableColumn("abstained", "abstained" * min_predicted_success),
+            TableColumn(
                 "wrong_when_executed",
                 "wrong when executed" * min_predicted_success,
                 text="{wrong_when_executed:percent}",
             ),
-            Column("predicted_success", "predicted success" * promises, text="{predicted_success:percent}"),
-            Column("brier"),
-            Column("as_demonstrated", value="demonstrated"),
-            Column("as_demonstrated_rate", "as demonstrated", "demonstrated_rate", "{demonstrated_rate:percent}"),
-            Column("loose_successes"),
-            Column("loose_rate", "loose", text="{loose_rate:percent}"),
-            Column("excluded"),
-            Column("failures", "failures", _all_endings, "{failures:endings}", words=True),
+            TableColumn("predicted_success", "predicted success" * promises, text="{predicted_success:percent}"),
+            TableColumn("brier"),
+            TableColumn("as_demonstrated", value="demonstrated"),
+            TableColumn("as_demonstrated_rate", "as demonstrated", "demonstrated_rate", "{demonstrated_rate:percent}"),
+            TableColumn("loose_successes"),
+            TableColumn("loose_rate", "loose", text="{loose_rate:percent}"),
+            TableColumn("excluded"),
+            TableColumn("failures", "failures", _all_endings, "{failures:endings}", words=True),
         ),
     )
 
@@ -73,46 +73,46 @@ def _all_endings(cell: ConditionResult) -> str:
     return endings(cell.failures, most=None)
 
 
-def pair_table(pairs: Sequence[Paired]) -> Table:
+def pair_table(pairs: Sequence[PairedComparison]) -> Table:
     """One line per cell, method and reference."""
     return Table(
         pairs,
         (
             *condition_columns(),
-            Column("reference", "against", words=True),
-            Column("pairs", "pairs"),
-            Column("only_method"),
-            Column("only_reference"),
-            Column(
+            TableColumn("reference", "against", words=True),
+            TableColumn("pairs", "pairs"),
+            TableColumn("only_method"),
+            TableColumn("only_reference"),
+            TableColumn(
                 "",
                 "right: both, it alone, other alone, neither",
                 "both",
                 "{both}, {only_method}, {only_reference}, {neither}",
             ),
-            Column("difference", "difference [points]", text="{difference:points} ({interval:points})"),
+            TableColumn("difference", "difference [points]", text="{difference:points} ({interval:points})"),
             *interval_columns(),
-            Column("p_mcnemar", "p (adjusted)", "p", "{p:p} ({p_adjusted:p})"),
-            Column("p_adjusted"),
-            Column("reference_failed", value="recovered.trials"),
-            Column(
+            TableColumn("p_mcnemar", "p (adjusted)", "p", "{p:p} ({p_adjusted:p})"),
+            TableColumn("p_adjusted"),
+            TableColumn("reference_failed", value="recovered.trials"),
+            TableColumn(
                 "recovered",
                 "recovered",
                 "recovered.successes",
                 "{recovered.successes} of {recovered.trials} ({recovered.interval:percents})",
             ),
-            Column("recovery_rate", value="recovered.rate"),
+            TableColumn("recovery_rate", value="recovered.rate"),
             *interval_columns("recovered.interval", "recovery_low_95", "recovery_high_95"),
-            Column("reference_right", value="harmed.trials"),
-            Column(
+            TableColumn("reference_right", value="harmed.trials"),
+            TableColumn(
                 "harmed",
                 "harmed",
                 "harmed.successes",
                 "{harmed.successes} of {harmed.trials} ({harmed.interval:percents})",
             ),
-            Column("harm_rate", value="harmed.rate"),
+            TableColumn("harm_rate", value="harmed.rate"),
             *interval_columns("harmed.interval", "harm_low_95", "harm_high_95"),
-            Column("planned"),
-            Column(
+            TableColumn("planned"),
+            TableColumn(
                 "free_difference_mm",
                 "free error, difference [mm]",
                 "free_mm",
@@ -138,12 +138,12 @@ def half_table(levels: Sequence[HalfLevel]) -> Table:
         levels,
         (
             *condition_columns(levels=False),
-            Column("smallest_level", value="smallest"),
-            Column("largest_level", value="largest"),
-            Column("trials", "n"),
-            Column("half_level", "half success at noise level", "noise_mm", "{text}"),
-            Column("surely_over", "surely", text="{sure_text}"),
-            Column("surely_under"),
+            TableColumn("smallest_level", value="smallest"),
+            TableColumn("largest_level", value="largest"),
+            TableColumn("trials", "n"),
+            TableColumn("half_level", "half success at noise level", "noise_mm", "{text}"),
+            TableColumn("surely_over", "surely", text="{sure_text}"),
+            TableColumn("surely_under"),
         ),
         "The noise level did not vary.",
         (

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from apo_bench.benchmark.analysis import Line, percent
-from apo_bench.benchmark.report.tables.table import Column, Table, condition_columns, interval_columns
+from apo_bench.benchmark.analysis import Line, format_percent
+from apo_bench.benchmark.report.tables.table import Table, TableColumn, condition_columns, interval_columns
 
-_METHOD = (Column("scenario", "scenario", words=True), Column("method", "method", words=True))
+_METHOD = (TableColumn("scenario", "scenario", words=True), TableColumn("method", "method", words=True))
 
 
 def gap_table(lines: Sequence[Line]) -> Table:
@@ -15,13 +15,13 @@ def gap_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             *condition_columns(),
-            Column("trials", "n"),
-            Column("observed_5"),
-            Column("observed_median_mm", "observed [mm]", text="{observed_median_mm:.3f}"),
-            Column("observed_95"),
-            Column("planned_5"),
-            Column("planned_median_mm", "planned [mm]", text="{planned_median_mm:.3f}"),
-            Column("planned_95", "95 % are below [mm]", text="{planned_95:.3f}"),
+            TableColumn("trials", "n"),
+            TableColumn("observed_5"),
+            TableColumn("observed_median_mm", "observed [mm]", text="{observed_median_mm:.3f}"),
+            TableColumn("observed_95"),
+            TableColumn("planned_5"),
+            TableColumn("planned_median_mm", "planned [mm]", text="{planned_median_mm:.3f}"),
+            TableColumn("planned_95", "95 % are below [mm]", text="{planned_95:.3f}"),
         ),
         "No method that corrects had a plan, so there is no gap to compare.",
         (
@@ -39,11 +39,11 @@ def probing_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             *condition_columns(),
-            Column("trials", "n"),
-            Column("probe_contacts", "probe contacts", text="{probe_contacts:.1f}"),
-            Column("rejected", "rejected"),
+            TableColumn("trials", "n"),
+            TableColumn("probe_contacts", "probe contacts", text="{probe_contacts:.1f}"),
+            TableColumn("rejected", "rejected"),
             *(
-                Column(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
+                TableColumn(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
                 for unit in ("mm", "deg")
                 for name, head in heads.items()
             ),
@@ -64,10 +64,10 @@ def effort_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             *_METHOD,
-            Column("trials", "right"),
-            Column("extra_steps", "extra steps", text="{extra_steps:.1f}"),
-            Column("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
-            Column("displaced_mm", "pushed at most", text="{displaced_mm:.2f} mm"),
+            TableColumn("trials", "right"),
+            TableColumn("extra_steps", "extra steps", text="{extra_steps:.1f}"),
+            TableColumn("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
+            TableColumn("displaced_mm", "pushed at most", text="{displaced_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
@@ -83,11 +83,11 @@ def time_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             *_METHOD,
-            Column("trials", "n"),
-            Column("trial_5_s", "5 % are below [s]", text="{trial_5_s:.2f}"),
-            Column("trial_median_s", "median [s]", text="{trial_median_s:.2f}"),
-            Column("trial_95_s", "95 % are below [s]", text="{trial_95_s:.2f}"),
-            Column("trial_sum_s", "together [s]", text="{trial_sum_s:.0f}"),
+            TableColumn("trials", "n"),
+            TableColumn("trial_5_s", "5 % are below [s]", text="{trial_5_s:.2f}"),
+            TableColumn("trial_median_s", "median [s]", text="{trial_median_s:.2f}"),
+            TableColumn("trial_95_s", "95 % are below [s]", text="{trial_95_s:.2f}"),
+            TableColumn("trial_sum_s", "together [s]", text="{trial_sum_s:.0f}"),
         ),
         "There is no timing.jsonl beside the rows, so times are not known.",
         "Without compilation and demonstration; in the drawing medians, and lines from the 5th to the 95th percentile.",
@@ -99,11 +99,11 @@ def work_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            Column("host", "host", words=True),
-            Column("worker", "worker", words=True),
-            Column("trials", "rows"),
-            Column("busy_s", "busy [s]", text="{busy_s:.0f}"),
-            Column("rows_per_minute", "rows per minute", text="{rows_per_minute:.1f}"),
+            TableColumn("host", "host", words=True),
+            TableColumn("worker", "worker", words=True),
+            TableColumn("trials", "rows"),
+            TableColumn("busy_s", "busy [s]", text="{busy_s:.0f}"),
+            TableColumn("rows_per_minute", "rows per minute", text="{rows_per_minute:.1f}"),
         ),
     )
 
@@ -114,17 +114,17 @@ def calibration_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            Column("scenario", "scenario", words=True),
-            Column("noise", "noise", words=True),
-            Column("contact_source", "contact_source", words=True),
-            Column("method", "method", words=True),
-            Column("planned", "n"),
-            Column("covered", "covered", text=share("covered")),
-            Column("fixed_mm", "fixed error [mm]", text="{fixed_mm:.3f}"),
-            Column("fixed_over_clearance", "over clearance", text="{fixed_over_clearance:.2f}"),
-            Column("free_mm", "free error [mm]", text="{free_mm:.3f}"),
-            Column("failed_tests", "test fails", text=share("failed_tests")),
-            Column("culprits", "culprit", text=share("culprits")),
+            TableColumn("scenario", "scenario", words=True),
+            TableColumn("noise", "noise", words=True),
+            TableColumn("contact_source", "contact_source", words=True),
+            TableColumn("method", "method", words=True),
+            TableColumn("planned", "n"),
+            TableColumn("covered", "covered", text=share("covered")),
+            TableColumn("fixed_mm", "fixed error [mm]", text="{fixed_mm:.3f}"),
+            TableColumn("fixed_over_clearance", "over clearance", text="{fixed_over_clearance:.2f}"),
+            TableColumn("free_mm", "free error [mm]", text="{free_mm:.3f}"),
+            TableColumn("failed_tests", "test fails", text=share("failed_tests")),
+            TableColumn("culprits", "culprit", text=share("culprits")),
         ),
         "No trial of a method but the oracle counts.",
         (
@@ -144,16 +144,16 @@ def confusion_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             *_METHOD,
-            Column("", "n", "executed"),
-            Column("predicted_fit_fitted", "fit: fitted"),
-            Column("predicted_fit_failed", "fit: failed"),
-            Column("predicted_fail_fitted", "fail: fitted"),
-            Column("predicted_fail_failed", "fail: failed"),
-            Column("agreement", "agreement", text="{agreement:percent}"),
-            Column("same_operation", "right operation", text="{same_operation} of {stopped}"),
-            Column("stopped"),
-            Column("not_executed", "not executed"),
-            Column("excluded", "excluded"),
+            TableColumn("", "n", "executed"),
+            TableColumn("predicted_fit_fitted", "fit: fitted"),
+            TableColumn("predicted_fit_failed", "fit: failed"),
+            TableColumn("predicted_fail_fitted", "fail: fitted"),
+            TableColumn("predicted_fail_failed", "fail: failed"),
+            TableColumn("agreement", "agreement", text="{agreement:percent}"),
+            TableColumn("same_operation", "right operation", text="{same_operation} of {stopped}"),
+            TableColumn("stopped"),
+            TableColumn("not_executed", "not executed"),
+            TableColumn("excluded", "excluded"),
         ),
         note=(
             "Before it is executed, a plan is predicted to *fit* or *fail*; then physics decides: *fitted* means made "
@@ -168,23 +168,23 @@ def detection_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            Column("scenario", "scenario", words=True),
-            Column("noise", "noise", words=True),
-            Column("pose_source", "pose_source", words=True),
-            Column("contact_source", "contact_source", words=True),
-            Column("human_error_scale", "human_error_scale", words=True),
-            Column("noise_mm", "noise [mm]", words=True),
-            Column("noise_deg", "noise [deg]", words=True),
-            Column("demonstrations"),
-            Column("complete", "all right", "complete.successes", "{complete.successes} of {demonstrations}"),
-            Column("rate", "rate", "complete.rate", "{complete.rate:percent}"),
-            Column("", "95 % interval", "complete.interval", "{complete.interval:percents}"),
+            TableColumn("scenario", "scenario", words=True),
+            TableColumn("noise", "noise", words=True),
+            TableColumn("pose_source", "pose_source", words=True),
+            TableColumn("contact_source", "contact_source", words=True),
+            TableColumn("human_error_scale", "human_error_scale", words=True),
+            TableColumn("noise_mm", "noise [mm]", words=True),
+            TableColumn("noise_deg", "noise [deg]", words=True),
+            TableColumn("demonstrations"),
+            TableColumn("complete", "all right", "complete.successes", "{complete.successes} of {demonstrations}"),
+            TableColumn("rate", "rate", "complete.rate", "{complete.rate:percent}"),
+            TableColumn("", "95 % interval", "complete.interval", "{complete.interval:percents}"),
             *interval_columns("complete.interval"),
-            Column("right"),
-            Column("missed", "missed"),
-            Column("false", "false"),
-            Column("precision", "precision", text="{precision:percent2}"),
-            Column("recall", "recall", text="{recall:percent2}"),
+            TableColumn("right"),
+            TableColumn("missed", "missed"),
+            TableColumn("false", "false"),
+            TableColumn("precision", "precision", text="{precision:percent2}"),
+            TableColumn("recall", "recall", text="{recall:percent2}"),
         ),
         "No method used detected contacts.",
         (
@@ -201,7 +201,7 @@ def prediction_summary(line: Line) -> str:
         return "Predicted: nothing, since no trial was executed."
     trials = "1 executed trial" if executed == 1 else f"{executed:,} executed trials"
     return (
-        f"Predicted: {line['right']:,} of {trials} ended as predicted ({percent(line['agreement'])}, counted by "
+        f"Predicted: {line['right']:,} of {trials} ended as predicted ({format_percent(line['agreement'])}, counted by "
         f"as_demonstrated); failures that were not predicted: {line['predicted_fit_failed']}, warnings that were "
         f"wrong: {line['predicted_fail_fitted']}."
     )

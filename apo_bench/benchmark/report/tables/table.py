@@ -8,8 +8,8 @@ from pathlib import Path
 from string import Formatter
 from typing import Any, NamedTuple, final
 
-from apo_bench.benchmark.analysis import percent, percents, points, signed
-from apo_bench.io import has_parquet, markdown, write_columns, write_csv
+from apo_bench.benchmark.analysis import format_percent, format_percent_interval, format_points, format_signed
+from apo_bench.io import escape_markdown, has_parquet, write_columns, write_csv
 
 DASH = "–"
 """Stands for what is not known."""
@@ -29,12 +29,12 @@ def _hundredths(share: float) -> str:
 
 
 _SPELLED: Mapping[str, Callable[[Any], str]] = {
-    "percent": percent,
-    "percent2": partial(percent, digits=2),
-    "percents": percents,
+    "percent": format_percent,
+    "percent2": partial(format_percent, digits=2),
+    "percents": format_percent_interval,
     "hundredths": _hundredths,
-    "points": points,
-    "signed": partial(signed, digits=3),
+    "points": format_points,
+    "signed": partial(format_signed, digits=3),
     "p": _p_value,
     "endings": endings,
 }
@@ -80,7 +80,7 @@ def look_up(item: Any, path: str) -> Any:
     return item
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """One of a table: with a name it is in files, with a head people read it."""
 
     name: str = ""
@@ -112,14 +112,14 @@ class Table:
     """Lines and columns."""
 
     items: Sequence[Any]
-    columns: Sequence[Column]
+    columns: Sequence[TableColumn]
     empty: str = "Nothing to show."
     """Said to people where there is no line."""
     note: str = ""
     """What its numbers are, in sentences; `code` and *emphasis* are marked as in Markdown."""
 
     @property
-    def shown(self) -> list[Column]:
+    def shown(self) -> list[TableColumn]:
         """The columns that people read."""
         return [column for column in self.columns if column.head]
 
@@ -129,7 +129,7 @@ class Table:
         return [[column.said(item) for column in self.shown] for item in self.items]
 
     @property
-    def ungrouped(self) -> list[Column]:
+    def ungrouped(self) -> list[TableColumn]:
         """The columns of a page: those that people read and no line of which stands above its group."""
         return [column for column in self.shown if not column.group]
 
@@ -141,7 +141,7 @@ class Table:
     def markdown(self) -> list[str]:
         """The table as lines of Markdown, in which no cell has markup, or the sentence where there is none."""
         heads = [column.head for column in self.shown]
-        lines = [f"| {' | '.join(map(markdown, cells))} |" for cells in (heads, *self.lines)]
+        lines = [f"| {' | '.join(map(escape_markdown, cells))} |" for cells in (heads, *self.lines)]
         return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
 
     def write(self, path: Path) -> list[Path]:
@@ -160,7 +160,7 @@ def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]
     return [path, beside]
 
 
-def condition_columns(path: str = "condition", levels: bool = True) -> tuple[Column, ...]:
+def condition_columns(path: str = "condition", levels: bool = True) -> tuple[TableColumn, ...]:
     """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
 
     Args:
@@ -176,26 +176,26 @@ def condition_columns(path: str = "condition", levels: bool = True) -> tuple[Col
         "min_predicted_success",
     )
     return (
-        Column("scenario", "scenario", f"{path}.scenario", words=True, group=True),
-        Column("", "conditions", f"{path}.description", words=True, group=True),
+        TableColumn("scenario", "scenario", f"{path}.scenario", words=True, group=True),
+        TableColumn("", "conditions", f"{path}.description", words=True, group=True),
         *(
-            Column(name, value=f"{path}.{name}")
+            TableColumn(name, value=f"{path}.{name}")
             for name in ("clearance_mm", "noise", "contact_source", "human_error_scale")
         ),
         *(
-            (Column("noise_mm", value=f"{path}.noise_mm"), Column("noise_deg", value=f"{path}.noise_deg"))
+            (TableColumn("noise_mm", value=f"{path}.noise_mm"), TableColumn("noise_deg", value=f"{path}.noise_deg"))
             if levels
             else ()
         ),
-        Column("method", "method", f"{path}.method", words=True),
-        *(Column(name, value=f"{path}.{name}") for name in last),
-        *([Column("", "noise level", f"{path}.noise_words")] * levels),
+        TableColumn("method", "method", f"{path}.method", words=True),
+        *(TableColumn(name, value=f"{path}.{name}") for name in last),
+        *([TableColumn("", "noise level", f"{path}.noise_words")] * levels),
     )
 
 
-def interval_columns(path: str = "interval", low: str = "low_95", high: str = "high_95") -> tuple[Column, ...]:
+def interval_columns(path: str = "interval", low: str = "low_95", high: str = "high_95") -> tuple[TableColumn, ...]:
     """Both ends of an interval, for files."""
-    return Column(low, value=f"{path}.low"), Column(high, value=f"{path}.high")
+    return TableColumn(low, value=f"{path}.low"), TableColumn(high, value=f"{path}.high")
 
 
 def _text(x: Any) -> Any:

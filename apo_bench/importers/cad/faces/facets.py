@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.importers.cad.solids import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, find_connected_groups
 
 FEWEST_SIDES = 12
 """The smallest number of flat pieces in a whole turn of a round face."""
@@ -60,7 +60,7 @@ def find_facets(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
     # Two triangles are of one piece if they face the same way, or nearly so and neither leaves the plane of the other.
     off = np.maximum(_height(mesh, normals, i, k), _height(mesh, normals, k, i))
     flat = (angle < _SAME_RAD) | ((angle < _NEAR_RAD) & (off < FLAT * mesh.extent))
-    count, of = connected_groups(mesh.neighbours[flat], len(mesh.triangles))
+    count, of = find_connected_groups(mesh.neighbours[flat], len(mesh.triangles))
     # Sums over the triangles of a piece: of n times twice the area, and of the middles, weighed by the area.
     across = np.zeros((count, 3))
     np.add.at(across, of, mesh.across)

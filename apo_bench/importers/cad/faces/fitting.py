@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import FLAT, Facets
-from apo_bench.importers.cad.solids import Mesh, Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
 _MOST_POINTS = 400
 _TURNED = 0.09
@@ -52,7 +52,7 @@ class Round(NamedTuple):
 
 def circle_through(points: Array, axis: Array) -> Round | None:
     """Return the cylinder along an axis nearest to points."""
-    x, y = square_to(axis)
+    x, y = find_square_axes(axis)
     middle = points.mean(axis=0)
     u = (points - middle) @ x
     v = (points - middle) @ y
@@ -82,7 +82,7 @@ def refine_round(start: Round | None, points: Array, cone: bool) -> Round | None
     # The point of the axis next to the middle of the points, so that turns of the axis and the radius hardly interact.
     at = start.point + (middle - start.point) @ start.axis * start.axis
     size = max(float(np.ptp(points, axis=0).max()), 1e-300)
-    x, y = square_to(start.axis)
+    x, y = find_square_axes(start.axis)
     slope = 0.0
     radius = float(distance.mean())
     if cone:
@@ -203,9 +203,9 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     )
 
 
-def turn_of(mesh: Mesh, triangles: Any, wall: Round) -> float:
+def measure_wall_turn(mesh: Mesh, triangles: Any, wall: Round) -> float:
     """Return how far around its axis a wall reaches, as its triangles lie there, [rad]."""
-    x, y = square_to(wall.axis)
+    x, y = find_square_axes(wall.axis)
     _, distance, out = wall.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
     angle = np.arctan2(out @ y, out @ x).reshape(-1, 3)
     # Each triangle from its lowest to its highest angle, seen from one of its corners; one on the axis has no angle.

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.importers.cad.faces.facets import Facets
 from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, facets_on, refine_round
-from apo_bench.importers.cad.solids import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, find_connected_groups
 
 _FEWEST = 3
 """Flat pieces of a round face."""
@@ -220,4 +220,4 @@ def smooth_groups(facets: Facets, members: Any) -> list[Any]:
 
 def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
     """How many groups members, ascending, are by the pairs among them, and the group of each."""
-    return connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))
+    return find_connected_groups(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

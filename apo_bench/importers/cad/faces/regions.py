@@ -8,7 +8,7 @@ from apo_bench.geometry import WHOLE_TURN
 from apo_bench.importers.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, find_facets
 from apo_bench.importers.cad.faces.fitting import fit_plane, round_region
 from apo_bench.importers.cad.faces.growing import FoundWall, find_walls, smooth_groups
-from apo_bench.importers.cad.solids import Mesh, Region, square_to
+from apo_bench.importers.cad.solids import Mesh, Region, find_square_axes
 
 _LARGER = 8.0
 """A flat piece that is larger by this factor than most of its neighbours on a free surface is a plane next to it."""
@@ -139,7 +139,7 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, wall: FoundWall, middle: 
 
 def _turn(facets: Facets, wall: FoundWall) -> float:
     """How far around its axis a round face reaches."""
-    x, y = square_to(wall.surface.axis)
+    x, y = find_square_axes(wall.surface.axis)
     _, _, out = wall.surface.polar(facets.centers[wall.members])
     middle = np.sort(np.arctan2(out @ y, out @ x))
     widest = float(np.diff(middle, append=middle[0] + WHOLE_TURN).max())

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from apo_bench.importers.cad.solids import Mesh, connected_groups
+from apo_bench.importers.cad.solids import Mesh, find_connected_groups
 
 SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
@@ -14,7 +14,7 @@ SAME_CORNER = 1e-7
 def merge_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
     """Merge near corners into the first of them; return the mesh, and which triangles, (t,), keep three corners."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
-    _, group = connected_groups(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
+    _, group = find_connected_groups(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
     first = np.unique(group, return_index=True)[1]
     triangles = group[index.ravel()][mesh.triangles]
     a, b, c = triangles.T

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.importers.cad.solids import Mesh, square_to
+from apo_bench.importers.cad.solids import Mesh, find_square_axes
 
 _SAME_AREA = 1e-6
 """Triangles cover a polygon once if their areas add up to its area within this part."""
@@ -55,7 +55,7 @@ def _triangulate(points: Array, polygon: Any) -> Any:
     area = float(np.linalg.norm(twice)) / 2.0
     if area == 0.0:
         return np.zeros((0, 3), dtype=np.int64)
-    flat = points @ np.array(square_to(twice / (2.0 * area))).T
+    flat = points @ np.array(find_square_axes(twice / (2.0 * area))).T
     cut = np.asarray(manifold3d.triangulate([flat]), dtype=np.int64).reshape(-1, 3)
     p, q = flat[cut[:, 1]] - flat[cut[:, 0]], flat[cut[:, 2]] - flat[cut[:, 0]]
     covered = float(np.abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()) / 2.0

@@ -13,11 +13,11 @@ from apo_bench.importers.cad.solids import (
     Mesh,
     RawSolid,
     SolidPlace,
-    body_of,
     concatenate_meshes,
-    connected_groups,
-    mesh_of,
-    simplify,
+    convert_to_manifold,
+    convert_to_mesh,
+    find_connected_groups,
+    simplify_body,
 )
 
 _MOST_SHELLS = 200
@@ -51,7 +51,7 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     for i, solid in enumerate(solids, start=1):
         _check_unfolded(path, solid)
         own_name = name if len(solids) == 1 else f"{name}_{i}"
-        fewer = simplify(solid)
+        fewer = simplify_body(solid)
         plain = fewer if len(fewer.triangles) < _FEWER * len(solid.triangles) else solid
         yield RawSolid(own_name, plain, (SolidPlace(own_name, np.eye(4)),), repairs)
 
@@ -73,12 +73,12 @@ def _closed_runs(mesh: Mesh) -> Iterator[Mesh]:
 
 def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
     """The connected surfaces of a mesh, but for sheets that have no room inside."""
-    body = body_of(mesh)
+    body = convert_to_manifold(mesh)
     if body.status() != manifold3d.Error.NoError:
         check_closed(path, mesh)
     bodies = body.decompose()
     # One shell stays as the file has it, so that copies of a solid have their triangles in the same order.
-    shells = [mesh] if len(bodies) == 1 and mesh.is_closed else [mesh_of(each) for each in bodies]
+    shells = [mesh] if len(bodies) == 1 and mesh.is_closed else [convert_to_mesh(each) for each in bodies]
     return [
         each
         for each in shells
@@ -92,7 +92,7 @@ def check_closed(path: Path, mesh: Mesh) -> None:
     single, many = (counts == 1).sum(), (counts > 2).sum()
     require(not single, f"{path}: the shell is open: {single:,} edges have a triangle on one side only; close it.")
     require(not many, f"{path}: {many:,} edges have more than two triangles; save each solid on its own.")
-    is_solid = body_of(mesh).status() == manifold3d.Error.NoError
+    is_solid = convert_to_manifold(mesh).status() == manifold3d.Error.NoError
     require(is_solid, f"{path}: neighbouring triangles face different ways; repair the solid in its CAD program.")
 
 
@@ -101,7 +101,7 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
 
     A shell in an even number of others is an outside, in an odd number a cavity.
     """
-    bodies = [body_of(shell) for shell in shells]
+    bodies = [convert_to_manifold(shell) for shell in shells]
     sizes = np.array([body.volume() for body in bodies])
     common = np.zeros((len(bodies), len(bodies)))
     for i, k in combinations(range(len(bodies)), 2):
@@ -109,12 +109,12 @@ def _combine(shells: Sequence[Mesh]) -> tuple[list[Mesh], int]:
     is_within = (common > (1.0 - _COMMON) * sizes[:, None]) & (sizes[:, None] < sizes)
     is_crossing = (common > _COMMON * np.minimum.outer(sizes, sizes)) & ~is_within & ~is_within.T
     if is_crossing.any():
-        _, group = connected_groups(np.argwhere(is_crossing), len(shells))
+        _, group = find_connected_groups(np.argwhere(is_crossing), len(shells))
         united = []
         for g in np.unique(group):
             members = np.flatnonzero(group == g).tolist()
             body = manifold3d.Manifold.batch_boolean([bodies[k] for k in members], manifold3d.OpType.Add)
-            united.append(shells[members[0]] if len(members) == 1 else mesh_of(body))
+            united.append(shells[members[0]] if len(members) == 1 else convert_to_mesh(body))
         return _combine(united)
     depth = is_within.sum(axis=1)
     solids = []

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from apo_bench.geometry import Array, Hull
-from apo_bench.importers.cad.solids import SAME_CORNER_MM, square_to
+from apo_bench.importers.cad.solids import SAME_CORNER_MM, find_square_axes
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300
@@ -89,7 +89,7 @@ def _on_flats(corners: Array, flats: Array, many: int) -> Any:
     for n, d in zip(flats[:, :3], flats[:, 3], strict=True):
         mine = np.flatnonzero(np.abs(corners @ n - d) < _ON_MM)
         if len(mine) >= 3:
-            x, y = square_to(n)
+            x, y = find_square_axes(n)
             way = np.outer(x, np.cos(turn)) + np.outer(y, np.sin(turn))
             kept.append(mine[(corners[mine] @ way).argmax(axis=0)])
     return np.unique(np.concatenate(kept))

@@ -14,7 +14,7 @@ from apo_bench.importers.cad.pieces.halving import convex_parts, cut_at_shoulder
 from apo_bench.importers.cad.pieces.holes import bore_piece, least_pieces
 from apo_bench.importers.cad.pieces.refining import Beside
 from apo_bench.importers.cad.pieces.shafts import as_cylinders, round_shafts
-from apo_bench.importers.cad.solids import RawSolid, Region, body_of
+from apo_bench.importers.cad.solids import RawSolid, Region, convert_to_manifold
 from apo_bench.scenario.parts.allowed import MOST_PIECES
 from apo_bench.scenario.parts.checking import touching_groups
 
@@ -48,7 +48,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
-    body = body_of(raw.mesh)
+    body = convert_to_manifold(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; repair it in its CAD program, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]

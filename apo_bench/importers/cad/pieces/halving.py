@@ -8,8 +8,8 @@ import numpy as np
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.corners import corners_of
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.pieces.refining import Beside, refine
-from apo_bench.importers.cad.solids import Region, mesh_of
+from apo_bench.importers.cad.pieces.refining import Beside, refine_pieces
+from apo_bench.importers.cad.solids import Region, convert_to_mesh
 
 _MOST_CUTS = 400
 _TRIES = 6
@@ -25,7 +25,7 @@ _FINE_TRIANGLES = 4000  # of a shape that is simplified before
 def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
     """Return parts that are convex, or that stand for a hollow free shape with their hull."""
     volume = solid.volume()
-    yield from refine(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
+    yield from refine_pieces(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
 
 
 def _parts(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
@@ -141,7 +141,7 @@ def snap_to_planes(corners: Array, planes: Array, size: float) -> Array:
 
 def _reflex_planes(body: Any, size: float) -> Array:
     """Planes, (k, 4), of sides at reflex edges, those with the longest edges in them first."""
-    mesh = mesh_of(body)
+    mesh = convert_to_mesh(body)
     length = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(length, 1e-300)[:, None]
     # An edge is reflex if the far corner of one triangle is above the plane of the other one.

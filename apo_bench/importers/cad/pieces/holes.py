@@ -8,14 +8,14 @@ import manifold3d
 import numpy as np
 from shapely import MultiPoint, Point
 
-from apo_bench.geometry import Array, sides_of
+from apo_bench.geometry import Array, count_sides
 from apo_bench.importers.cad.pieces.corners import corners_of, hull_corners, is_thick, merge_near_points
 from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 
 
 def least_pieces(bores: Sequence[Region]) -> int:
     """Return the smallest number of wedges around round holes."""
-    return sum(sides_of(1e-3 * max(bore.radii)) for bore in bores)
+    return sum(count_sides(1e-3 * max(bore.radii)) for bore in bores)
 
 
 def bore_piece(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
@@ -81,7 +81,7 @@ def _around(part: Any, bore: Region) -> Iterator[Any]:
     above, rest = part.split_by_plane(axis, foot + bore.span[1])
     slab, below = rest.split_by_plane(axis, foot + bore.span[0])
     yield from (each for each in (above, below) if not each.is_empty())
-    n = sides_of(1e-3 * max(bore.radii))
+    n = count_sides(1e-3 * max(bore.radii))
     slope = bore.slope if bore.kind == "cone" else 0.0
     at = bore.point + bore.span[0] * axis
     for i in range(n):

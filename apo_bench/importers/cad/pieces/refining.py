@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.pieces.cut_part import SLIVER, CutPart, cut_through
-from apo_bench.importers.cad.solids import Mesh, mesh_of, square_to
+from apo_bench.importers.cad.solids import Mesh, convert_to_mesh, find_square_axes
 
 _DEEP_MM = 0.02
 """How deep the surface may lie in a hull where other solids come near."""
@@ -75,7 +75,7 @@ class _Fault(NamedTuple):
     """Of the sides there, (k, 3)."""
 
 
-def refine(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
+def refine_pieces(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
     """Cut parts on where they are too hollow, the most hollow first, up to the largest number of pieces.
 
     Args:
@@ -101,7 +101,7 @@ def refine(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float)
 
 
 def _worst_fault(part: CutPart, beside: Beside) -> _Fault:
-    mesh = mesh_of(part.body)
+    mesh = convert_to_mesh(part.body)
     planes = _planes(mesh.corners)
     middles = [mesh.corners[each].mean(axis=1) for each in (mesh.edges, mesh.triangles)]
     points = np.concatenate([mesh.corners, *middles])
@@ -139,7 +139,7 @@ def _cut_at(part: CutPart, fault: _Fault, least: float, hair: float) -> list[Cut
     normals = fault.normals
     if len(normals) > 1:
         mean = normals.mean(axis=0)
-        x, y = square_to(mean / max(float(np.linalg.norm(mean)), 1e-12))
+        x, y = find_square_axes(mean / max(float(np.linalg.norm(mean)), 1e-12))
         _, first = np.unique(np.round(normals, 3), axis=0, return_index=True)
         normals = np.array([*normals[np.sort(first)][:3], *np.eye(3), x, y, (x + y) / 2**0.5, (x - y) / 2**0.5])
     return cut_through(part, fault.point, normals, least, hair)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
+from apo_bench.geometry import Array, Cylinder, Hull, count_sides, make_cylinder_hull
 from apo_bench.importers.cad.pieces.corners import merge_near_points
 from apo_bench.importers.cad.solids import SAME_CORNER_MM, Region
 from apo_bench.scenario.parts.allowed import THINNEST_M, WIDEST_M
@@ -26,7 +26,7 @@ def round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
             continue
         # Rings of corners, level by level. New ones lie on the true circle: between two sides more of them bring the
         # sides nearer to the wall.
-        count = sides_of(1e-3 * max(shaft.radii))
+        count = count_sides(1e-3 * max(shaft.radii))
         for h in np.unique(np.round(height[on], 3)):
             mine = on & (np.abs(height - h) < 2e-3)
             angles, is_whole = _around_axis(np.sort(angle[mine]), count)
@@ -79,4 +79,4 @@ def _as_cylinder(piece: Hull, shaft: Region) -> Hull | None:
     if not (level & (np.abs(distance - radius) < 1e-5 * radius + 1e-5)).all():
         return None
     center = 1e-3 * (shaft.point + (low + high) / 2.0 * shaft.direction)
-    return cylinder_hull("", Cylinder(center, shaft.direction, 1e-3 * radius, 5e-4 * (high - low)))
+    return make_cylinder_hull("", Cylinder(center, shaft.direction, 1e-3 * radius, 5e-4 * (high - low)))

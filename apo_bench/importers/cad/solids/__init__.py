@@ -1,10 +1,10 @@
 """Solids of CAD files: meshes, regions of their surface, names, lengths in mm."""
 
-from apo_bench.importers.cad.solids.bodies import body_of, mesh_of, simplify
-from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, connected_groups
-from apo_bench.importers.cad.solids.naming import clean_title, free_name, name_regions, part_name
+from apo_bench.importers.cad.solids.bodies import convert_to_manifold, convert_to_mesh, simplify_body
+from apo_bench.importers.cad.solids.mesh import Mesh, concatenate_meshes, find_connected_groups
+from apo_bench.importers.cad.solids.naming import clean_title, find_free_name, make_part_name, name_regions
 from apo_bench.importers.cad.solids.raw_solid import RawSolid, Rgb, SolidPlace, merge_copies
-from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region, square_to
+from apo_bench.importers.cad.solids.region import SAME_CORNER_MM, Region, find_square_axes
 
 __all__ = [
     "SAME_CORNER_MM",
@@ -13,15 +13,15 @@ __all__ = [
     "Region",
     "Rgb",
     "SolidPlace",
-    "body_of",
     "clean_title",
     "concatenate_meshes",
-    "connected_groups",
-    "free_name",
+    "convert_to_manifold",
+    "convert_to_mesh",
+    "find_connected_groups",
+    "find_free_name",
+    "find_square_axes",
+    "make_part_name",
     "merge_copies",
-    "mesh_of",
     "name_regions",
-    "part_name",
-    "simplify",
-    "square_to",
+    "simplify_body",
 ]

@@ -11,19 +11,19 @@ _FLAT = 1e-6
 """Corners this near to a flat piece, in parts of the size, are left out of it."""
 
 
-def body_of(mesh: Mesh) -> Any:
+def convert_to_manifold(mesh: Mesh) -> Any:
     """Return a mesh as a body of manifold3d."""
     # Copies, as it takes no arrays that are only to be read.
     corners = np.array(mesh.corners, order="C")
     return manifold3d.Manifold(manifold3d.Mesh64(corners, np.array(mesh.triangles, dtype=np.uint64, order="C")))
 
 
-def mesh_of(body: Any) -> Mesh:
+def convert_to_mesh(body: Any) -> Mesh:
     """Return a body of manifold3d as a mesh."""
     raw = body.to_mesh64()
     return Mesh(np.asarray(raw.vert_properties)[:, :3], np.asarray(raw.tri_verts).astype(np.int64))
 
 
-def simplify(mesh: Mesh) -> Mesh:
+def simplify_body(mesh: Mesh) -> Mesh:
     """Return a closed mesh without corners in its flat pieces."""
-    return mesh_of(body_of(mesh).simplify(_FLAT * mesh.extent))
+    return convert_to_mesh(convert_to_manifold(mesh).simplify(_FLAT * mesh.extent))

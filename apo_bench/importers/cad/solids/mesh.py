@@ -84,6 +84,6 @@ def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.concatenate([mesh.corners for mesh in meshes]), np.concatenate(triangles))
 
 
-def connected_groups(pairs: Any, count: int) -> tuple[int, Any]:
+def find_connected_groups(pairs: Any, count: int) -> tuple[int, Any]:
     """Return how many groups pairs, (p, 2), make of 0 ... count - 1, and the group of each, (count,)."""
     return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)

@@ -59,7 +59,7 @@ def rename_faces(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     return replace(raw, regions=tuple(regions))
 
 
-def part_name(text: str, used: Container[str]) -> str:
+def make_part_name(text: str, used: Container[str]) -> str:
     """Return an unused name that a part may have, from any text.
 
     Letters with accents become plain ones. A text with letters that have no Latin form gives `part_1`, `part_2`, ...
@@ -67,7 +67,7 @@ def part_name(text: str, used: Container[str]) -> str:
     plain = _latin(text)
     if not plain.strip("_"):
         return next(free for free in (f"part_{n}" for n in count(1)) if free not in used)
-    return free_name(plain if plain[:1].isalpha() else f"part_{plain}", used)
+    return find_free_name(plain if plain[:1].isalpha() else f"part_{plain}", used)
 
 
 def _latin(text: str) -> str:
@@ -87,7 +87,7 @@ def clean_title(text: str) -> str:
     return clean(text)[:_LONGEST_TITLE]
 
 
-def free_name(name: str, used: Container[str]) -> str:
+def find_free_name(name: str, used: Container[str]) -> str:
     """Return the name, or the first unused one with a number behind it."""
     return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 

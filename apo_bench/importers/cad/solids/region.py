@@ -13,7 +13,7 @@ SAME_CORNER_MM = 2e-4
 """Corners of a piece nearer to each other than this are one."""
 
 
-def square_to(direction: Array) -> tuple[Array, Array]:
+def find_square_axes(direction: Array) -> tuple[Array, Array]:
     """Return two unit vectors square to a unit vector z: x from the frame's axis that is farthest from z, y = z x x."""
     x = np.eye(3)[int(np.abs(direction).argmin())]
     x = x - (x @ direction) * direction
@@ -63,7 +63,7 @@ class Region:
     @cached_property
     def across(self) -> tuple[Array, Array]:
         """Two directions across the axis."""
-        return square_to(self.direction)
+        return find_square_axes(self.direction)
 
     @property
     def ends(self) -> Array:

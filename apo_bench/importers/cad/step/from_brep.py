@@ -8,10 +8,17 @@ from scipy.spatial import ConvexHull
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
-from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
+from apo_bench.importers.cad.faces.fitting import Round, border_of, measure_wall_turn, plane_region, round_region
 from apo_bench.importers.cad.meshes.joining import SAME_CORNER, merge_corners
 from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
-from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, concatenate_meshes, connected_groups, name_regions
+from apo_bench.importers.cad.solids import (
+    Mesh,
+    RawSolid,
+    Region,
+    concatenate_meshes,
+    find_connected_groups,
+    name_regions,
+)
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane, is_same_surface
 
 _LEVEL = 1e-6
@@ -34,7 +41,7 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
     neighbours = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
     pairs = [(i, k) for i, k in neighbours.tolist() if i != k and is_same_surface(faces[i], faces[k], mesh.extent)]
-    _, group = connected_groups(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
+    _, group = find_connected_groups(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(faces))
     first_of_group = [faces[int(k)] for k in np.unique(group, return_index=True)[1]]
     mesh, owner = _in_strips(mesh, group[owner], [face.surface for face in first_of_group])
     regions = []
@@ -60,7 +67,7 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Plane | Round | None]) -> 
     """
     for k, wall in enumerate(surfaces):
         mine = np.flatnonzero(owner == k)
-        if not isinstance(wall, Round) or not len(mine) or turn_of(mesh, mine, wall) < WHOLE_TURN:
+        if not isinstance(wall, Round) or not len(mine) or measure_wall_turn(mesh, mine, wall) < WHOLE_TURN:
             continue
         strips = _strips(mesh, mine, wall)
         if strips is not None:
@@ -99,4 +106,4 @@ def _region(mesh: Mesh, triangles: Any, surface: Plane | Round | None) -> Region
         return plane_region(triangles, sign * surface.normal, surface.point)
     _, _, out = surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
-    return round_region(mesh, triangles, surface, hole, turn_of(mesh, triangles, surface))
+    return round_region(mesh, triangles, surface, hole, measure_wall_turn(mesh, triangles, surface))

@@ -15,9 +15,9 @@ from apo_bench.perception.observation.models import (
     MeasuredNoise,
     Residuals,
     Split,
-    log_density_across,
-    log_density_along,
-    of_numbers,
+    compute_log_density_across,
+    compute_log_density_along,
+    unpack_tails,
 )
 
 _FEWEST = 30
@@ -96,8 +96,8 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         )
 
     def surprise(at: Array) -> float:
-        split = of_numbers(at, limit)
-        seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
+        split = unpack_tails(at, limit)
+        seen = compute_log_density_across(split.across, r).mean() + compute_log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
 
     # Medians of a Gaussian: 1.18 s of a length across (Rayleigh), 0.675 s of a size along.
@@ -111,7 +111,7 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         method="L-BFGS-B",
         options={"ftol": 1e-13, "gtol": 1e-7},
     )
-    return of_numbers(best.x, limit)
+    return unpack_tails(best.x, limit)
 
 
 def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:

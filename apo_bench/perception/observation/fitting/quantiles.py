@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.perception.observation.models import LEAST_FREEDOM, SMALLEST_SCALE, Split, Tail, of_numbers
+from apo_bench.perception.observation.models import LEAST_FREEDOM, SMALLEST_SCALE, Split, Tail, unpack_tails
 
 LOWER_QUARTILE_OF_THREE = 1.10115
 """Lower quartile of the length of a vector of three standard normal numbers (chi with three degrees of freedom)."""
@@ -36,7 +36,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
     grid = limit * np.linspace(0.0, 1.0, 801)[1:] ** 2
 
     def off(at: Array) -> Array:
-        split = of_numbers(at, limit)
+        split = unpack_tails(at, limit)
         sizes = [
             np.interp(np.array([*given]) / 100.0, np.maximum.accumulate(cdf(grid)), grid)
             for given, cdf in ((across, split.cdf_across), (along, split.cdf_along))
@@ -46,7 +46,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
     start = [np.log(np.median([*across.values()])), 0.3, np.log(np.median([*along.values()])), 0.3]
     low = [np.log(SMALLEST_SCALE * limit), 0.0] * 2
     best = least_squares(off, start, bounds=(low, [np.log(limit), 1.0 / LEAST_FREEDOM] * 2), diff_step=1e-4)
-    return of_numbers(best.x, limit)
+    return unpack_tails(best.x, limit)
 
 
 def round_split(lower_quartile: float, limit: float) -> Split:

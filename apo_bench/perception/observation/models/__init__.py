@@ -1,23 +1,29 @@
 """Noise models, one a file."""
 
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.models.displacement import floor_covariance, with_shared
-from apo_bench.perception.observation.models.empirical import Empirical, empirical_noise
+from apo_bench.perception.observation.models.displacement import add_shared_error, floor_covariance
+from apo_bench.perception.observation.models.empirical import EmpiricalNoise, load_empirical_noise
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 from apo_bench.perception.observation.models.failures import CameraFailures
 from apo_bench.perception.observation.models.fitted import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
-    Fitted,
+    FittedNoise,
     MeasuredNoise,
 )
-from apo_bench.perception.observation.models.isotropic import HeavyTailed, Isotropic, PerPart
-from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, Outliers, last_seen
+from apo_bench.perception.observation.models.isotropic import HeavyTailedNoise, IsotropicNoise, PerPartNoise
+from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, OutlierNoise, find_last_seen
 from apo_bench.perception.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.perception.observation.models.shared import Bias
-from apo_bench.perception.observation.models.sighted import Anisotropic, Sighted
-from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
-from apo_bench.perception.observation.models.tails import Split, Tail, log_density_across, log_density_along, of_numbers
+from apo_bench.perception.observation.models.shared import BiasNoise
+from apo_bench.perception.observation.models.sighted import AnisotropicNoise, CameraNoise
+from apo_bench.perception.observation.models.symmetric import AnyTurnNoise, SymmetricNoise
+from apo_bench.perception.observation.models.tails import (
+    Split,
+    Tail,
+    compute_log_density_across,
+    compute_log_density_along,
+    unpack_tails,
+)
 
 __all__ = (
     "INLIER_MM",
@@ -25,30 +31,30 @@ __all__ = (
     "SMALLEST_SCALE",
     "TURNED_DEG",
     "UNSEEN_DEVIATION",
-    "Anisotropic",
-    "AnyTurn",
-    "Bias",
+    "AnisotropicNoise",
+    "AnyTurnNoise",
+    "BiasNoise",
     "Camera",
     "CameraFailures",
-    "Empirical",
+    "CameraNoise",
+    "EmpiricalNoise",
     "Facts",
-    "Fitted",
-    "HeavyTailed",
-    "Isotropic",
+    "FittedNoise",
+    "HeavyTailedNoise",
+    "IsotropicNoise",
     "MeasuredNoise",
     "NoiseLevel",
-    "Outliers",
-    "PerPart",
+    "OutlierNoise",
+    "PerPartNoise",
     "Residuals",
-    "Sighted",
     "Split",
-    "Symmetric",
+    "SymmetricNoise",
     "Tail",
-    "empirical_noise",
+    "add_shared_error",
+    "compute_log_density_across",
+    "compute_log_density_along",
+    "find_last_seen",
     "floor_covariance",
-    "last_seen",
-    "log_density_across",
-    "log_density_along",
-    "of_numbers",
-    "with_shared",
+    "load_empirical_noise",
+    "unpack_tails",
 )

@@ -10,9 +10,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import Array, frozen, is_rigid, pose
+from apo_bench.geometry import Array, copy_frozen, is_rigid, pose
 
-WORKSPACE_MIDDLE_M = frozen([0.12, 0.0, 0.03], 3)
+WORKSPACE_MIDDLE_M = copy_frozen([0.12, 0.0, 0.03], 3)
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
 CAMERA_DISTANCE_M = 0.9
 CAMERA_ELEVATION_DEG = 40.0
@@ -43,7 +43,7 @@ class Camera:
     """(4, 4), axes of OpenCV, [m]."""
 
     def __post_init__(self) -> None:
-        T = frozen(self.T_world_camera, 4, 4)
+        T = copy_frozen(self.T_world_camera, 4, 4)
         require(
             is_rigid(T[None])[0],
             "the pose of a camera was given that is not rigid; give a rotation and a place in metres.",

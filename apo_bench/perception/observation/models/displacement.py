@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 
-COVARIANCE_FLOOR = frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
+COVARIANCE_FLOOR = copy_frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
 """Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
 
 
@@ -45,10 +45,10 @@ def observe_shared(
         shared: The poses that are seen, (n, 4, 4) -> what operations share.
     """
     seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
-    return with_shared(seen, *shared(seen.poses)) if own.any() else seen
+    return add_shared_error(seen, *shared(seen.poses)) if own.any() else seen
 
 
-def with_shared(observation: Observation, *shared: SharedError) -> Observation:
+def add_shared_error(observation: Observation, *shared: SharedError) -> Observation:
     """An observation that states, beside what it states already, errors that operations share."""
     stated = np.array(observation.covariance)
     for error in shared:

@@ -7,9 +7,9 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates
+from apo_bench.assembly import Assembly, Demonstration, Observation, make_measured_model
 from apo_bench.errors import require
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, copy_frozen, pose
 from apo_bench.io import CsvRow, read_csv
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
@@ -44,8 +44,8 @@ class Sample:
     """Part of those that were found, that are outliers."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "inliers", frozen(self.inliers, None, 6))
-        object.__setattr__(self, "outliers", frozen(self.outliers, None, 6))
+        object.__setattr__(self, "inliers", copy_frozen(self.inliers, None, 6))
+        object.__setattr__(self, "outliers", copy_frozen(self.outliers, None, 6))
 
     @property
     def covariance(self) -> Array:
@@ -55,7 +55,7 @@ class Sample:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Empirical:
+class EmpiricalNoise:
     """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
 
     It is taken as it is or with the opposite sign, both equally often, so that it is 0 in the mean: a bias of the
@@ -93,16 +93,16 @@ class Empirical:
         seen = observe_in_ray_frames(
             self.camera, self.noise_level, demonstration, assembly, sign * errors, sample.covariance, missed
         )
-        return replace(seen, outliers=measured_rates(sample.gross))
+        return replace(seen, outliers=make_measured_model(sample.gross))
 
 
-def empirical_noise(path: Path, noise_level: NoiseLevel) -> Empirical:
+def load_empirical_noise(path: Path, noise_level: NoiseLevel) -> EmpiricalNoise:
     """The noise model of a file of residuals; a file is read once.
 
     Raises:
         InputError: Anything in the file that is not as described, with the line where it stands.
     """
-    return Empirical(_read_once(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
+    return EmpiricalNoise(_read_once(path, path.stat().st_mtime_ns if path.exists() else 0), noise_level)
 
 
 def residuals_text(residuals: Residuals) -> str:
@@ -120,7 +120,7 @@ def residuals_text(residuals: Residuals) -> str:
 
 
 def read_residuals(path: str | Path) -> Sample:
-    """The residuals of a file; see `empirical_noise`."""
+    """The residuals of a file; see `load_empirical_noise`."""
     columns = {name: (name, 1.0) for name in _COLUMNS}
     errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
     for row in read_csv(path, columns, _COLUMNS):

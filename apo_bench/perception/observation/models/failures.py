@@ -11,9 +11,9 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates, placements
+from apo_bench.assembly import Assembly, Demonstration, Observation, compute_placements, make_measured_model
 from apo_bench.errors import require
-from apo_bench.geometry import Array, approximate_symmetries, pose
+from apo_bench.geometry import Array, find_approximate_symmetries, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
@@ -124,7 +124,7 @@ class CameraFailures:
         seen = observe_displaced(demonstration.assembly, seeming, xi, np.diag(sigma**2))
         x, y, z = self.camera.T_world_camera[:3, 3].tolist()
         gross = min(1.0, sum(failure.rate for failure in self.failures))
-        rates = replace(measured_rates(gross, 0.0), repeat=min(self.repeat, _MOST_REPEAT), camera_m=(x, y, z))
+        rates = replace(make_measured_model(gross, 0.0), repeat=min(self.repeat, _MOST_REPEAT), camera_m=(x, y, z))
         return replace(seen, outliers=rates)
 
 
@@ -137,14 +137,14 @@ def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
     """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
     assembly = shown.assembly
     for k in draw_failing(len(poses), rate, rng):
-        turns = approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
+        turns = find_approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
         if len(turns):
             poses[k] = poses[k] @ turns[rng.integers(len(turns))]
 
 
 def _leave_behind(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen where they were before the operation moved them."""
-    before = (shown.start, *placements(shown.assembly, shown.start, shown.poses))
+    before = (shown.start, *compute_placements(shown.assembly, shown.start, shown.poses))
     for k in draw_failing(len(poses), rate, rng):
         poses[k] = before[k][shown.assembly.operations[k].main]
 

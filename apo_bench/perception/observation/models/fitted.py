@@ -9,13 +9,13 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, Tails, measured_rates
+from apo_bench.assembly import Assembly, Demonstration, Observation, Tails, make_measured_model
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import displace, floor_covariance, observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
-from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, last_seen
+from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, find_last_seen
 from apo_bench.perception.observation.models.tails import Split
 
 SMALLEST_SCALE = 1e-4
@@ -52,7 +52,7 @@ class MeasuredNoise:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedNoise:
     """Every goal is seen at `T exp(xi)`, xi of the error (x, y, along; rx, ry, about) that is drawn in its ray's frame.
 
     Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
@@ -102,7 +102,7 @@ class Fitted:
         tails = (
             stated_tails(measured, self.noise_level, self.camera, seen.poses) if min(self.noise_level) > 0.0 else None
         )
-        return replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
+        return replace(seen, outliers=make_measured_model(measured.outliers), tails=tails)
 
 
 def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
@@ -110,7 +110,9 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
 
     Operations that were not observed keep their covariance.
     """
-    stated = floor_covariance(camera.covariance(observation.poses, Fitted(measured, _AS_MEASURED, camera).covariance))
+    stated = floor_covariance(
+        camera.covariance(observation.poses, FittedNoise(measured, _AS_MEASURED, camera).covariance)
+    )
     stated = np.where(observation.observed[:, None, None], stated, observation.covariance)
     tails = stated_tails(measured, _AS_MEASURED, camera, observation.poses)
     return replace(observation, covariance=stated, shared=(), tails=tails)
@@ -171,7 +173,7 @@ def observe_in_ray_frames(
     missed = missed & (max(noise_level) > 0.0)
     poses = seen.poses.copy()
     stated = seen.covariance.copy()
-    poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
+    poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
     return replace(seen, poses=poses, covariance=stated, observed=~missed)
 

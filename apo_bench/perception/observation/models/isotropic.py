@@ -21,7 +21,7 @@ _FARTHEST = 1e6
 
 @final
 @dataclass(frozen=True)
-class Isotropic:
+class IsotropicNoise:
     """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
 
     Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
@@ -46,7 +46,7 @@ class Isotropic:
 
 @final
 @dataclass(frozen=True)
-class PerPart:
+class PerPartNoise:
     """Isotropic noise with one factor per part on the level, in every operation that moves the part.
 
     Factors are log-uniform, and drawn after the unit draws of the twists: at all levels a part has the same factor,
@@ -77,7 +77,7 @@ class PerPart:
 
 @final
 @dataclass(frozen=True)
-class HeavyTailed:
+class HeavyTailedNoise:
     """Isotropic noise from a multivariate Student t in place of a Gaussian: position and turn are bad together.
 
     It is scaled so that the level is the true standard deviation, which is finite above two degrees of freedom.

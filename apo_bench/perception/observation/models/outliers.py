@@ -6,8 +6,8 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
-from apo_bench.geometry import Array, frozen
+from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, make_measured_model
+from apo_bench.geometry import Array, copy_frozen
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
@@ -16,13 +16,13 @@ MISSES = 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
 OUTLIER_TIMES = 10.0
 """An outlier errs by so many times the level."""
-UNSEEN_DEVIATION = frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
+UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
 """Standard deviation that is stated of what was not seen, [m, rad]."""
 
 
 @final
 @dataclass(frozen=True)
-class Outliers:
+class OutlierNoise:
     """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
     What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
@@ -64,13 +64,13 @@ class Outliers:
         missed = (chance[:, 1] < self.misses) & (max(self.noise_level) > 0.0)
         poses = seen.poses.copy()
         covariance = seen.covariance.copy()
-        poses[missed] = last_seen(assembly, demonstration.start, poses, ~missed)[missed]
+        poses[missed] = find_last_seen(assembly, demonstration.start, poses, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
-        stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
+        stated = make_measured_model(0.0, self.outliers, self.times) if self.times > 1.0 else None
         return replace(seen, poses=poses, covariance=covariance, observed=~missed, outliers=stated)
 
 
-def last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
+def find_last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
     """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
     now = dict(start)
     out = poses.copy()

@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, correlate_first_order
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.camera import Camera
 from apo_bench.perception.observation.models.displacement import observe_displaced, observe_shared
@@ -20,7 +20,7 @@ CORRELATION = 0.9
 
 @final
 @dataclass(frozen=True)
-class Bias:
+class BiasNoise:
     """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
 
     Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
@@ -54,7 +54,7 @@ class Bias:
 
 @final
 @dataclass(frozen=True, eq=False)
-class BiasView:
+class ViewBiasNoise:
     """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
 
     What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
@@ -93,7 +93,7 @@ class BiasView:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Correlated:
+class CorrelatedNoise:
     """Isotropic Gaussian noise whose errors follow a first-order autoregression from operation to operation.
 
     It drifts in the axes of the camera, whatever part is moved, as with a mount that warms up. After any number of
@@ -126,7 +126,7 @@ class Correlated:
 
         def shared(poses: Array) -> list[SharedError]:
             every = tuple(range(len(assembly)))
-            between = first_order(len(every), self.correlation)
+            between = correlate_first_order(len(every), self.correlation)
             T = self.camera.T_world_camera
             return [SharedError("drift", every, np.diag(sigma**2), T, local=True, correlation=between)]
 

@@ -27,7 +27,7 @@ IN_IMAGE = 0.5
 
 @final
 @dataclass(frozen=True)
-class Anisotropic:
+class AnisotropicNoise:
     """Every goal is seen at `T exp(xi)`; turned into the world, xi is Gaussian with axes along and across the sight.
 
     A camera finds depth less well than the place in the image, and a turn that tilts a part out of the image less
@@ -74,7 +74,7 @@ class Anisotropic:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Sighted:
+class CameraNoise:
     """Every part errs about its own ray: along it, across it, about it, and by tilting towards it.
 
     The factors on the level are those of `anisotropic`, which is this seen from infinitely far away: there all rays are

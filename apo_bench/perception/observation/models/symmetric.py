@@ -9,13 +9,13 @@ from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.geometry import (
     Array,
     Solid,
-    across_axis,
-    folds,
-    nearest_symmetric_pose,
+    count_folds,
+    find_direction_across,
+    find_nearest_symmetric_pose,
+    find_revolution,
+    find_symmetries,
+    make_turn,
     pose,
-    revolution,
-    symmetries,
-    turn_about,
 )
 from apo_bench.perception.observation.models.displacement import observe_displaced
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
@@ -27,7 +27,7 @@ _MANY = 3.0
 
 @final
 @dataclass(frozen=True)
-class Symmetric:
+class SymmetricNoise:
     """Isotropic noise about the centre of volume, larger for turns that hardly change how a part looks.
 
     About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
@@ -58,7 +58,7 @@ class Symmetric:
         notes=(
             "a part of revolution is the same after any turn about its axis: that turn is reported, and stated, as if "
             "its edges told it",
-            "`apo_bench.perception.observation.models.symmetric:AnyTurn` reports any of the equal poses instead, "
+            "`apo_bench.perception.observation.models.symmetric:AnyTurnNoise` reports any of the equal poses instead, "
             "each as likely, also at level 0: an estimator that knows nothing of faces. The same space is filled, but "
             "a contact that names a face is then asked of another side",
         ),
@@ -68,7 +68,7 @@ class Symmetric:
         unit = rng.standard_normal((len(assembly), 6))
         xi = np.zeros((len(assembly), 6))
         covariance = np.zeros((len(assembly), 6, 6))
-        groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
+        groups = {part: find_symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
         for k, operation in enumerate(assembly.operations):
             solid = assembly.solids[operation.main]
             group = groups[operation.main]
@@ -77,7 +77,7 @@ class Symmetric:
             sigma, stated = self._deviations(fold)
             if np.any(unit[k] * sigma):
                 # About the centre of volume: the body twist there is Ad(frame) xi at the part's origin.
-                xi[k] = pose.log(nearest_symmetric_pose(pose.exp(about @ (unit[k] * sigma)), group, np.eye(3)))
+                xi[k] = pose.log(find_nearest_symmetric_pose(pose.exp(about @ (unit[k] * sigma)), group, np.eye(3)))
             covariance[k] = about @ np.diag(stated**2) @ about.T
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
@@ -94,10 +94,10 @@ def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
     the same in a whole turn about each, (3,).
     """
     frame = pose.at(solid.centroid)
-    body = revolution(solid)
+    body = find_revolution(solid)
     if body is None:
-        return frame, folds(group)
-    x = across_axis(body.axis)
+        return frame, count_folds(group)
+    x = find_direction_across(body.axis)
     frame = np.array(frame)
     frame[:3, :3] = np.column_stack([x, np.cross(body.axis, x), body.axis])
     return frame, np.array([len(group), len(group), np.inf])
@@ -105,7 +105,7 @@ def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
 
 @final
 @dataclass(frozen=True)
-class AnyTurn:
+class AnyTurnNoise:
     """Noise of `symmetric` that reports any of the poses that look the same, each as likely, whatever the level.
 
     The covariance is that about the pose of the same look which is nearest to what is reported.
@@ -114,7 +114,7 @@ class AnyTurn:
     noise_level: NoiseLevel
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        seen = Symmetric(self.noise_level)(assembly, demonstration, rng)
+        seen = SymmetricNoise(self.noise_level)(assembly, demonstration, rng)
         g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
         Ad = pose.adjoint(pose.inverse(g))
         C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)
@@ -122,7 +122,7 @@ class AnyTurn:
 
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:
-        group = symmetries(solid)
-        body = revolution(solid)
+        group = find_symmetries(solid)
+        body = find_revolution(solid)
         turn = np.asarray(group[rng.integers(len(group))])
-        return turn if body is None else turn_about(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn
+        return turn if body is None else make_turn(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn

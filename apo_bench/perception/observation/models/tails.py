@@ -50,7 +50,7 @@ class Split:
         top = np.arcsinh(self.limit / self.along.scale)
         y = top * _X
         x = s * np.sinh(y)
-        return x, top * _W * s * np.cosh(y) * np.exp(log_density_along(self.along, x))
+        return x, top * _W * s * np.cosh(y) * np.exp(compute_log_density_along(self.along, x))
 
     @cached_property
     def inside(self) -> float:
@@ -88,7 +88,7 @@ class Split:
         # x = s sinh(y), so dx = s cosh(y) dy = hypot(s, x) dy, and y runs to asinh(end / s).
         top = np.arcsinh(end / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
-        return x, top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x)), end
+        return x, top * _W * np.hypot(self.along.scale, x) * np.exp(compute_log_density_along(self.along, x)), end
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
         """Errors (n, 3); what falls outside the limit is drawn again."""
@@ -107,13 +107,13 @@ class Split:
         return np.sqrt(np.maximum(np.asarray(limit) ** 2 - x * x, 0.0))
 
 
-def of_numbers(at: Array, limit: float) -> Split:
+def unpack_tails(at: Array, limit: float) -> Split:
     """From four numbers to fit: logarithm of the scale and inverse of the degrees of freedom, across, then along."""
     tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / _GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
     return Split(tails[0], tails[1], limit)
 
 
-def log_density_along(tail: Tail, x: Array) -> Array:
+def compute_log_density_along(tail: Tail, x: Array) -> Array:
     """The logarithm of the density of Student t in one direction."""
     from scipy.special import gammaln
 
@@ -126,7 +126,7 @@ def log_density_along(tail: Tail, x: Array) -> Array:
     return np.asarray(norm - (n + 1.0) / 2.0 * np.log1p(h * u))
 
 
-def log_density_across(tail: Tail, r: Array) -> Array:
+def compute_log_density_across(tail: Tail, r: Array) -> Array:
     """The logarithm of the density, per area, of Student t in two directions, at a distance r."""
     h = tail.heaviness
     u = (r / tail.scale) ** 2

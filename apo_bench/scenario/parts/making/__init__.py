@@ -3,9 +3,17 @@
 from apo_bench.scenario.parts.making.body import Body, join
 from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude
 from apo_bench.scenario.parts.making.frustums import Frustum
-from apo_bench.scenario.parts.making.outline import Edge, Outline, circle, polygon, rectangle, round_corners, slot
-from apo_bench.scenario.parts.making.revolve import revolve, shaft
-from apo_bench.scenario.parts.making.writing import solid_of, write_part
+from apo_bench.scenario.parts.making.outline import (
+    Edge,
+    Outline,
+    make_circle,
+    make_polygon,
+    make_rectangle,
+    make_slot,
+    round_corners,
+)
+from apo_bench.scenario.parts.making.revolve import make_shaft, revolve
+from apo_bench.scenario.parts.making.writing import build_solid, write_part
 
 __all__ = [
     "Body",
@@ -14,15 +22,15 @@ __all__ = [
     "Frustum",
     "Outline",
     "bore",
-    "circle",
+    "build_solid",
     "extrude",
     "join",
-    "polygon",
-    "rectangle",
+    "make_circle",
+    "make_polygon",
+    "make_rectangle",
+    "make_shaft",
+    "make_slot",
     "revolve",
     "round_corners",
-    "shaft",
-    "slot",
-    "solid_of",
     "write_part",
 ]

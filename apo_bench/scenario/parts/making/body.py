@@ -13,9 +13,9 @@ from apo_bench.geometry import (
     Face,
     Hull,
     RoundFace,
-    flat_area,
-    polygons_of,
-    rings_of,
+    list_polygons,
+    list_rings,
+    make_flat_area,
     straighten,
 )
 from apo_bench.scenario.parts.making.moments import Moments, sum_moments
@@ -113,8 +113,8 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
         on = [f for f in left if abs(abs(n @ f.normal) - 1.0) < _PARALLEL and abs(n @ f.outline[0] - d) < _SAME_M]
         left = [f for f in left if not any(f is each for each in on)]
         to_plane = _plane(n)
-        same = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal > 0.0]
-        other = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal < 0.0]
+        same = [(f, make_flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal > 0.0]
+        other = [(f, make_flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal < 0.0]
         if not other and len(same) == 1:
             yield same[0][0]
             continue
@@ -132,8 +132,8 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
 
 def _apart(area: Any) -> Iterable[Any]:
     """Polygons; what hangs together in a point alone is apart, since no file has the point twice."""
-    for polygon in polygons_of(area):
-        parts = [*polygons_of(shapely.set_precision(polygon, _SAME_M))]
+    for polygon in list_polygons(area):
+        parts = [*list_polygons(shapely.set_precision(polygon, _SAME_M))]
         yield from parts if len(parts) > 1 else [polygon]
 
 
@@ -146,7 +146,7 @@ def _plane(n: Array) -> Array:
 
 
 def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
-    flat = [straighten(ring) for ring in rings_of(polygon, sign)]
+    flat = [straighten(ring) for ring in list_rings(polygon, sign)]
     outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
     return Face(name, outline, tuple(holes), fit)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Point, Polygon, box, unary_union
 
-from apo_bench.geometry import Array, polygons_of, rings_of, straighten
+from apo_bench.geometry import Array, list_polygons, list_rings, straighten
 
 _SAME_MM = 1e-6
 _ON_MM = 1e-9
@@ -24,13 +24,13 @@ def cut_convex(area: Any) -> list[Array]:
     Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
     there are at most four times as many as need be.
     """
-    return [cell for polygon in polygons_of(area) if polygon.area > _SLIVER_MM2 for cell in _cut(polygon)]
+    return [cell for polygon in list_polygons(area) if polygon.area > _SLIVER_MM2 for cell in _cut(polygon)]
 
 
 def _cut(polygon: Any) -> list[Array]:
     from manifold3d import triangulate
 
-    rings = [straighten(ring) for ring in rings_of(polygon, 1.0)]
+    rings = [straighten(ring) for ring in list_rings(polygon, 1.0)]
     if len(rings) == 1 and is_convex(rings[0]):
         return rings
     points = np.concatenate(rings)
@@ -79,7 +79,7 @@ def find_bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array
         others: Middles and radii of the other bores: between two bores each has its side.
     """
     for reach in (radius * share for share in _REACHES):
-        square = rings_of(box(*(at - reach), *(at + reach)), 1.0)[0]
+        square = list_rings(box(*(at - reach), *(at + reach)), 1.0)[0]
         for middle, r in others:
             gap = np.linalg.norm(middle - at)
             n = (middle - at) / gap
@@ -87,7 +87,7 @@ def find_bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array
         cell = Polygon(square).intersection(free)
         if cell.geom_type != "Polygon" or cell.interiors:
             continue
-        corners = straighten(rings_of(cell, 1.0)[0])
+        corners = straighten(list_rings(cell, 1.0)[0])
         if is_convex(corners) and cell.contains(Point(at)) and cell.exterior.distance(Point(at)) > radius + _SAME_MM:
             return corners
     return None

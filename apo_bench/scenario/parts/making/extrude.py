@@ -23,7 +23,15 @@ from apo_bench.scenario.parts.making.frustums import (
     subtract_steps,
 )
 from apo_bench.scenario.parts.making.moments import extrude_moments, sum_moments
-from apo_bench.scenario.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
+from apo_bench.scenario.parts.making.outline import (
+    Outline,
+    arc_of,
+    goes_on,
+    make_circle,
+    outline_moments,
+    receding,
+    trace_outline,
+)
 
 _NARROW_MM = 6e-3
 
@@ -90,7 +98,7 @@ def extrude(
     Raises:
         ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
     """
-    area = Polygon(ring(outline), [ring(hole, hole=True) for hole in holes])
+    area = Polygon(trace_outline(outline), [trace_outline(hole, hole=True) for hole in holes])
     discs = [Polygon(circumscribe_polygon(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
     apart = all(not a.intersects(b) for a, b in combinations(discs, 2))
     if not area.is_valid or area.area <= 0.0 or not apart or not all(area.contains(disc) for disc in discs):
@@ -125,10 +133,10 @@ def extrude(
 
 def _bands(area: Any, outline: Outline, holes: Sequence[Outline]) -> list[Array]:
     """Areas behind the sides that recede, of outlines and holes of which an arc does."""
-    rings = [] if not _round_fit(outline) else [(ring(outline), receding(outline))]
+    rings = [] if not _round_fit(outline) else [(trace_outline(outline), receding(outline))]
     for hole in filter(_round_fit, holes):
         fit = receding(hole, hole=True)
-        rings.append((ring(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
+        rings.append((trace_outline(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
     return cut_bands(area, rings)
 
 
@@ -142,7 +150,7 @@ def _as_hole(each: Bore, low: float, high: float) -> Outline:
     through = abs(step.low - low) < 1e-6 and abs(step.high - high) < 1e-6 and step.radii[0] == step.radii[1]
     if len(each.steps) > 1 or not through:
         raise ValueError(f"there is no convex area around the bore at {each.at} mm; cut the part in two beside it")
-    return circle(step.radius, each.at, step.name, step.fit, step.sides)
+    return make_circle(step.radius, each.at, step.name, step.fit, step.sides)
 
 
 def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
@@ -228,8 +236,8 @@ def _ends(
 ) -> Iterator[Face]:
     for z, name, above in ((low, bottom, True), (high, top, False)):
         openings = [circumscribe_polygon(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
-        inner = [*(ring(hole, hole=True) for hole in holes), *openings]
-        yield flat_face(name, ring(outline), inner, z, up=not above, fit=name in fit and bool(name))
+        inner = [*(trace_outline(hole, hole=True) for hole in holes), *openings]
+        yield flat_face(name, trace_outline(outline), inner, z, up=not above, fit=name in fit and bool(name))
 
 
 def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:

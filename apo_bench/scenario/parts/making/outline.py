@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Array, sides_of
+from apo_bench.geometry import Array, count_sides
 from apo_bench.scenario.parts.making.moments import Moments, polygon_moments, segment_moments
 
 COARSE_SIDES = 12
@@ -59,7 +59,7 @@ class OutlineArc(NamedTuple):
 
 
 @check_arguments
-def polygon(
+def make_polygon(
     *corners: tuple[float, float], names: Mapping[int, str] | Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
     """Straight sides; side i leads from corner i to the next one.
@@ -73,18 +73,18 @@ def polygon(
 
 
 @check_arguments
-def rectangle(
+def make_rectangle(
     width: float, depth: float, at: tuple[float, float] = (0.0, 0.0), names: Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
     """A rectangle about its middle; its sides are, in this order, at -y, +x, +y, -x."""
     x, y = at
     a = width / 2.0
     b = depth / 2.0
-    return polygon((x - a, y - b), (x + a, y - b), (x + a, y + b), (x - a, y + b), names=names, fit=fit)
+    return make_polygon((x - a, y - b), (x + a, y - b), (x + a, y + b), (x - a, y + b), names=names, fit=fit)
 
 
 @check_arguments
-def circle(
+def make_circle(
     radius: float, at: tuple[float, float] = (0.0, 0.0), name: str = "", fit: bool = False, sides: int | None = None
 ) -> Outline:
     """A whole turn, as two arcs that become one face."""
@@ -92,7 +92,7 @@ def circle(
 
 
 @check_arguments
-def slot(
+def make_slot(
     length: float,
     width: float,
     at: tuple[float, float] = (0.0, 0.0),
@@ -144,7 +144,7 @@ def arc_of(outline: Outline, i: int) -> OutlineArc | None:
     return OutlineArc(np.array(edge.center), r, first, turn - 2.0 * np.pi if edge.clockwise else turn)
 
 
-def ring(outline: Outline, hole: bool = False) -> Array:
+def trace_outline(outline: Outline, hole: bool = False) -> Array:
     """The corners of an outline, (k, 2), [mm].
 
     Arcs that bulge out of the material have their corners on the circle; those that bulge into it are tangent to it
@@ -154,7 +154,7 @@ def ring(outline: Outline, hole: bool = False) -> Array:
 
 
 def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
-    """Whether the sides of a ring recede by the clearance: each that begins at a corner of `ring`, (k,)."""
+    """Whether the sides of a ring recede by the clearance: each that begins at a corner of `trace_outline`, (k,)."""
     return np.array([edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)], dtype=np.bool_)
 
 
@@ -189,7 +189,7 @@ def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
 
 def needed_sides(stated: int | None, name: str, radius_mm: float) -> int:
     """Into how many sides a whole turn of a wall is cut: as stated, as a contact needs if it has a name, or few."""
-    return stated or (sides_of(1e-3 * radius_mm) if name else COARSE_SIDES)
+    return stated or (count_sides(1e-3 * radius_mm) if name else COARSE_SIDES)
 
 
 def outline_moments(outline: Outline) -> Moments:

@@ -7,7 +7,7 @@ import numpy as np
 from shapely import Polygon
 
 from apo_bench.arguments import check_arguments
-from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
+from apo_bench.geometry import Array, Cylinder, Face, Hull, list_polygons, list_rings, make_cylinder_hull
 from apo_bench.scenario.parts.making.body import Body
 from apo_bench.scenario.parts.making.cells import clip, cut_wedges
 from apo_bench.scenario.parts.making.extrude import flat_face
@@ -57,7 +57,7 @@ def revolve(
 
 
 @check_arguments
-def shaft(
+def make_shaft(
     radius: float,
     low: float,
     high: float,
@@ -83,7 +83,7 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
     high = around.at(b)
     if bore is None and abs(low - high) < _SAME_MM:
         center = np.array([0.0, 0.0, 5e-4 * (a + b)])
-        yield cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, 5e-4 * (b - a)))
+        yield make_cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, 5e-4 * (b - a)))
     elif bore is None:
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
     else:
@@ -113,7 +113,7 @@ def _flats(outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: s
         areas.append(disc.difference(Polygon(circumscribe_polygon((0.0, 0.0), r, k))) if r else disc)
     below, over = areas
     for rest, up in ((below.difference(over), True), (over.difference(below), False)):
-        for polygon in polygons_of(rest):
+        for polygon in list_polygons(rest):
             if not polygon.buffer(-_NARROW_MM / 2).is_empty:
-                outline, *holes = rings_of(polygon, 1.0)
+                outline, *holes = list_rings(polygon, 1.0)
                 yield flat_face(name, outline, [hole[::-1] for hole in holes], z, up)

@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
-from apo_bench.io import toml_text, write_file
+from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, make_flat_area
+from apo_bench.io import format_toml, write_file
 from apo_bench.scenario.parts.allowed import THINNEST_M, is_name
 from apo_bench.scenario.parts.making.body import Body
 from apo_bench.scenario.parts.stated import PART_SCHEMA
@@ -19,7 +19,7 @@ _ALIGNED = 1e-9
 _STEEL = (0.70, 0.72, 0.75)
 
 
-def solid_of(name: str, body: Body) -> Solid:
+def build_solid(name: str, body: Body) -> Solid:
     """The solid: pieces called `p1`, `p2`, ..., faces without a name `auto_px_1`, `auto_flat_1`, `auto_bore_1`, ...
 
     Raises:
@@ -103,7 +103,7 @@ def write_part(
     """
     require(is_name(name), f"the name '{name}' of a part must be a letter, then letters, digits and underscores.")
     require(density > 0.0, f"a density of {density:g} kg/m^3 was given; a number above 0 is allowed.")
-    solid = solid_of(name, body)
+    solid = build_solid(name, body)
     path = folder / f"{name}.xml"
     boxes = all_boxes(solid.pieces)
     matter = {"density": f"{density:g}", "friction": _words(friction)} if boxes else {}
@@ -153,7 +153,7 @@ def _inside(face: Face) -> Array:
     """A point of a face, well inside of it."""
     axis = int(np.abs(face.normal).argmax())
     plane = [(axis + 1) % 3, (axis + 2) % 3]
-    point = flat_area(face.outline, face.holes, np.eye(3)[:, plane]).representative_point()
+    point = make_flat_area(face.outline, face.holes, np.eye(3)[:, plane]).representative_point()
     inside = np.array(face.outline[0])
     inside[plane] = point.x, point.y
     return inside
@@ -178,7 +178,7 @@ def stated_text(
         "faces": {face.name: _plane_table(face) for face in solid.faces.values()}
         | {wall.name: _round_table(wall) for wall in solid.rounds.values()},
     }
-    return toml_text(document)
+    return format_toml(document)
 
 
 def _plane_table(face: Face) -> dict[str, Any]:

@@ -62,6 +62,6 @@ class ProbingConfig:
     seed: tuple[int, ...]
     """Of the noise of its sensor."""
     ft_sensor: str = USUAL_FT_SENSOR
-    """The sensor at its wrist, as in `ft_noise`."""
+    """The sensor at its wrist, as in `parse_ft_noise`."""
     actions: tuple[str, ...] = PROBING_ACTIONS
     """Of `PROBING_ACTIONS`."""

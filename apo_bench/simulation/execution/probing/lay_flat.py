@@ -18,11 +18,11 @@ from apo_bench.simulation.robot import (
     READING_S,
     Robot,
     comply,
-    part_loads,
-    reading,
+    compute_part_loads,
+    move_to_height,
+    read_wrist,
     smooth_trajectory,
     translate,
-    with_height,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -61,15 +61,15 @@ def lay_flat(robot: Robot, probing: ProbingState, operation: int, t: Transfer, g
     robot.stage, robot.macro = "attach", "lay-flat"
     robot.follow(smooth_trajectory(robot.T, translate(t.flat.T @ grip.T_part_tip, UP, NEAR_M), LAY_SPEED))
     robot.stand()
-    with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
-        probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
+    with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
+        probing.wrist.hold(*compute_part_loads(robot.scene, {t.part: held}))
         touches = _press_flat(robot, probing, operation, t.flat, held)
         probing.wrist.hold()
         robot.follow(smooth_trajectory(robot.T, translate(robot.T, UP, _OFF_M), _OFF))
     grip = probing.grip(operation, touches, held, grip)
     for place in t.side_touches:
         grip = touch_side(robot, probing, operation, t, place, grip, held)
-    above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
+    above = before_insertion(t) @ grip.T_part_tip if t.into.level else move_to_height(robot.T, float(T_before[2, 3]))
     robot.follow(smooth_trajectory(robot.T, above, _UP))
     robot.stand()
     return grip

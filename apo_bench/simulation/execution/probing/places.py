@@ -10,13 +10,13 @@ import numpy as np
 from shapely import Point
 
 from apo_bench.assembly import Plan
-from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
+from apo_bench.geometry import Array, Box, Face, flatten_face, make_plane_frame, measure_face_area, pose
 from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.flat_placement import NOISE_LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.execution.grasping import gripper_depth, list_obstacles
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M, upright_walls
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot import Obstacle, gripper_boxes, translate
+from apo_bench.simulation.robot import Obstacle, list_gripper_boxes, translate
 from apo_bench.simulation.scene import Scene
 
 OPENING_M = 0.004
@@ -71,12 +71,12 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
     T = plan.start[part]
     n = T[:3, :3] @ face.normal
     d = float(n @ (T[:3, :3] @ face.outline[0] + T[:3, 3]))
-    around = obstacles(plan.assembly.solids, plan.start, (part,))
+    around = list_obstacles(plan.assembly.solids, plan.start, (part,))
     rest = scene.kinematics.forward(scene.arm.home)[:3, :3]
     patch = _lowest(_boxes(scene))
     point = patch.mean(axis=0)
     middle = plan.target_poses[:, :2, 3].mean(axis=0)
-    to_face = pose.inverse(T @ plane_frame(face))
+    to_face = pose.inverse(T @ make_plane_frame(face))
 
     def at(radius: float, k: int) -> TouchPlace | None:
         angle = 2.0 * np.pi * (k % _ANGLES) / _ANGLES
@@ -85,7 +85,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
         there = frame(rest, touched - rest @ point)
         away = stand_off(there, n)
         begins = translate(there, n, away)
-        if not own_shape(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
+        if not flatten_face(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
             return None
         return TouchPlace(begins, -n, patch, n, d, away) if _free(scene, begins, around) else None
 
@@ -106,7 +106,7 @@ def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off
 def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
     """One place on each wall of what is fixed that locates a later fit."""
     ahead = np.array([0.0, 1.0])
-    around = obstacles(plan.assembly.solids, plan.start, ())
+    around = list_obstacles(plan.assembly.solids, plan.start, ())
     places = [
         _with_room(scene, around, face, plan.start[part], ahead, stand_off)
         for part, face in upright_walls(plan.assembly, plan.start)
@@ -119,7 +119,7 @@ def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_
 
     There the fingers give way, on both sides: only the difference of the two is used.
     """
-    around = obstacles(plan.assembly.solids, plan.start, ())
+    around = list_obstacles(plan.assembly.solids, plan.start, ())
     for part, face in upright_walls(plan.assembly, plan.start):
         both = [
             place
@@ -140,7 +140,7 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
         for face in plan.assembly.solids[part].faces.values()
         if plan.start[part][2, :3] @ face.normal > NOISE_LEVEL
     ]
-    return max(up, key=lambda each: face_area(each[1]), default=None)
+    return max(up, key=lambda each: measure_face_area(each[1]), default=None)
 
 
 def _with_room(
@@ -189,7 +189,7 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandO
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
-    return gripper_boxes(scene.kinematics, OPENING_M)
+    return list_gripper_boxes(scene.kinematics, OPENING_M)
 
 
 def _lowest(boxes: Sequence[Box]) -> Array:

@@ -7,13 +7,13 @@ from apo_bench.simulation.execution.side_touches import STAND_OFF_M, SideTouch
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot import (
     Robot,
-    part_loads,
+    compute_part_loads,
+    move_to_height,
+    plan_steady_trajectory,
     press,
-    reading,
+    read_wrist,
     smooth_trajectory,
-    steady_trajectory,
     translate,
-    with_height,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -37,20 +37,22 @@ def touch_side(
     T = place.T @ grip.T_part_tip
     high = max(t.safe, float(T[2, 3]))
     robot.macro = "touch-wall"
-    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _DOWN))
-    robot.go(with_height(T, high), _CARRY)
+    robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, high), _DOWN))
+    robot.go(move_to_height(T, high), _CARRY)
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
     touches = []
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
-    with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
-        probing.wrist.hold(*part_loads(robot.scene, {t.part: held}))
+    with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
+        probing.wrist.hold(*compute_part_loads(robot.scene, {t.part: held}))
         end = translate(robot.T, place.direction, 2.0 * STAND_OFF_M + BEYOND_M)
-        left = press(robot, steady_trajectory(robot.T, end, SPEED), place.direction, probing.touch_n, probing.wrist)
+        left = press(
+            robot, plan_steady_trajectory(robot.T, end, SPEED), place.direction, probing.touch_n, probing.wrist
+        )
         if left is not None:
             n, d = probing.plane_by_camera(place.normal, place.edge)
             touches = [probing.touch(robot, n, d, place.point, (operation, held))]
         probing.wrist.hold()
         robot.follow(smooth_trajectory(robot.T, T, _DOWN))
-    robot.follow(smooth_trajectory(robot.T, with_height(T, high), _DOWN))
+    robot.follow(smooth_trajectory(robot.T, move_to_height(T, high), _DOWN))
     return probing.grip(operation, touches, held, grip)

@@ -16,7 +16,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.flat_placement import FlatPlacement
 from apo_bench.simulation.execution.probing.config import CalibrationEstimate, ProbingConfig
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot import Robot, RobotError, WristSensor, wrist_of, zero
+from apo_bench.simulation.robot import Robot, RobotError, WristSensor, get_wrist, zero
 from apo_bench.simulation.scene import Scene
 
 TOUCH_SIGMA_M = 3e-5
@@ -56,7 +56,7 @@ class ProbingState:
 
     def begin(self, robot: Robot) -> None:
         """Zero the sensor at the wrist, in free air."""
-        self._wrist = wrist_of(robot, self._config.ft_sensor, np.random.default_rng(self._config.seed))
+        self._wrist = get_wrist(robot, self._config.ft_sensor, np.random.default_rng(self._config.seed))
         zero(robot, self._wrist)
 
     @property

@@ -20,13 +20,13 @@ from apo_bench.simulation.hooks import TOUCHING
 from apo_bench.simulation.robot import (
     ExecutionAborted,
     Robot,
+    measure_turn,
+    move_to_height,
+    plan_steady_trajectory,
     press,
-    reading,
+    read_wrist,
     smooth_trajectory,
-    steady_trajectory,
     translate,
-    turn_from,
-    with_height,
 )
 from apo_bench.simulation.scene import allow_sleep
 
@@ -84,18 +84,18 @@ def _touch(robot: Robot, probing: ProbingState, place: TouchPlace) -> list[tuple
     T = probing.residual.hand_eye @ place.T_world_tip @ probing.residual.tool
     direction = probing.residual.hand_eye[:3, :3] @ place.direction
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
-    robot.follow(smooth_trajectory(robot.T, with_height(robot.T, high), _OVER))
+    robot.follow(smooth_trajectory(robot.T, move_to_height(robot.T, high), _OVER))
     rest = robot.scene.kinematics.forward(robot.scene.arm.home)
-    if abs(turn_from(rest, T) - turn_from(rest, robot.T)) > _HALF_TURN:
-        robot.go(with_height(rest, high), _OVER)
-    robot.go(with_height(T, high), _OVER)
+    if abs(measure_turn(rest, T) - measure_turn(rest, robot.T)) > _HALF_TURN:
+        robot.go(move_to_height(rest, high), _OVER)
+    robot.go(move_to_height(T, high), _OVER)
     robot.follow(smooth_trajectory(robot.T, T, _DOWN))
     robot.stand()
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
-    with allow_sleep(robot.scene.work, False), reading(robot, probing.wrist):
+    with allow_sleep(robot.scene.work, False), read_wrist(robot, probing.wrist):
         end = translate(robot.T, direction, 2.0 * place.stand_off + BEYOND_M)
-        left = press(robot, steady_trajectory(robot.T, end, SPEED), direction, probing.touch_n, probing.wrist)
+        left = press(robot, plan_steady_trajectory(robot.T, end, SPEED), direction, probing.touch_n, probing.wrist)
         touched = probing.touch(robot, place.normal, place.offset, place.patch.mean(axis=0))
         robot.follow(smooth_trajectory(robot.T, T, _BACK))
-    robot.follow(smooth_trajectory(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
+    robot.follow(smooth_trajectory(robot.T, move_to_height(T, T[2, 3] + _HIGH_M), _BACK))
     return [] if left is None else [(touched, place.patch)]
