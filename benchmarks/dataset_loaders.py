@@ -94,7 +94,7 @@ def environment(folder: Path, python: str, needs: tuple[str, ...]) -> Path:
 def trains(python: Path, data: Path) -> None:
     """A few steps of a small policy, and an episode of it, by LeRobot's commands and the files of the guide."""
     here = data.parent / "trained"
-    guide = (ROOT / "docs" / "guide" / "insertion.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs" / "guide" / "lerobot.md").read_text(encoding="utf-8")
     for name, text in re.findall(r'^```py(?:thon)? title="([^"]+)"\n(.*?)^```$', guide, re.M | re.S):
         (here / name).parent.mkdir(parents=True, exist_ok=True)
         (here / name).write_text(text, encoding="utf-8")

@@ -1,9 +1,10 @@
 """Keep the trials of the headline and write its page: `python benchmarks/headline.py [FOLDER [--full FULL]]`.
 
 Takes a sweep of benchmarks/headline.toml (`make headline`) and writes benchmarks/results/headline/ (trials, table, what
-ran), then docs/results/headline.md, its figure, and the summary in README.md and docs/index.md. Without a folder it
-writes the pages from the kept trials. With a second sweep, of the same grid at fidelity full, it also writes how far
-the verdicts of the two agree. `--trials N` takes the first N seeds.
+ran), then docs/results/headline.md, its figure, and the summary in docs/index.md. Without a folder it writes the pages
+from the kept trials; `python -m benchmarks.readme_table` then writes the table of README.md. With a second sweep, of
+the same grid at fidelity full, it also writes how far the verdicts of the two agree. `--trials N` takes the first N
+seeds.
 """
 
 from __future__ import annotations
@@ -34,7 +35,6 @@ KEPT = ROOT / "benchmarks" / "results" / "headline"
 PAGE = ROOT / "docs" / "results" / "headline.md"
 FIGURE = ROOT / "docs" / "pictures" / "headline.png"
 BLOCKS = {
-    ROOT / "README.md": ("docs/pictures", "docs/results/headline.md"),
     ROOT / "docs" / "index.md": ("pictures", "results/headline.md"),
 }
 """Pages with the summary: the folder of pictures from there, and the page with all numbers."""

@@ -27,7 +27,7 @@ OUTLIERS = (
 )
 ROBOT = (
     f"{NOISE:g} mm and degree, no human error. Every trial draws a [robot "
-    "error](../guide/arm.md#errors-of-the-robot); the numbers are standard deviations in mm and "
+    "error](../guide/robot-error.md#errors-of-the-robot); the numbers are standard deviations in mm and "
     "degrees. Contacts correct the errors of the camera, not those of the robot: `oracle`, which has the true poses, "
     "fails as well."
 )

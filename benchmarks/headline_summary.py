@@ -1,4 +1,4 @@
-"""The headline in one sentence and one figure, the same in README, on the start page and on the page of the headline.
+"""The headline in a few sentences and one figure, the same on the start page and on the page of the headline.
 
 Rates are pooled over the scenarios of the sweep: observed poses (`uncorrected`), a spiral search (`spiral-search`),
 corrected poses (`contact-robust`), and the limits of these: outliers, and errors of the robot itself.
@@ -80,9 +80,9 @@ def sentence(summary: Summary) -> str:
         _percent(pool(summary.cells, method, NOISE)) for method in ("uncorrected", "spiral-search", summary.corrected)
     )
     result = (
-        f"With pose errors of {NOISE:g} mm and {NOISE:g} degree (1 sigma per axis) a robot finishes **{observed}** of "
-        f"the assemblies as observed, **{searched}** with a spiral search for the holes, and **{corrected}** after "
-        "face contacts have corrected the poses."
+        f"With pose noise of {NOISE:g} mm, {NOISE:g} degree (1 sigma per axis) the replay of the observed poses "
+        f"succeeds in **{observed}** of the trials, with a spiral search in **{searched}**. Corrected by face contacts "
+        f"it succeeds in **{corrected}**."
     )
     limits = []
     measured = pool(summary.cells, summary.corrected, NOISE, noise=MEASURED)
@@ -94,7 +94,7 @@ def sentence(summary: Summary) -> str:
     robot, both = (robot_rate(summary, f"{summary.corrected}{more}", ROBOT_ERROR) for more in ("", "+spiral"))
     if robot:
         also = f" (**{_percent(both)}** with a search)" if both else ""
-        limits.append(f"**{_percent(robot)}**{also} with a robot whose own error is half a millimetre")
+        limits.append(f"**{_percent(robot)}**{also} with a robot error of 0.5 mm")
     return f"{result} The limits: {', and '.join(limits)}." if limits else result
 
 

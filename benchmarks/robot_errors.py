@@ -27,7 +27,7 @@ poses, fails. A robot that [probes](../how/probing.md) estimates its own error b
 Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it.
 Success: the finished assembly is right; the same seeds in every condition, no human error, clearance of 0.25 mm per
 side, and noise of 1 mm and 1 degree for all methods but `oracle`. Every trial draws a [robot
-error](../guide/arm.md#errors-of-the-robot); the numbers are standard deviations in mm and degrees.
+error](../guide/robot-error.md#errors-of-the-robot); the numbers are standard deviations in mm and degrees.
 Rates over all scenarios have Wilson's 95 % intervals. The sweeps ran with {} revision(s) of the package, so lines
 may be some commits apart.
 """
