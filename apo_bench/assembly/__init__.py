@@ -30,7 +30,7 @@ from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.outlier_model import OutlierModel, make_measured_model
 from apo_bench.assembly.pattern import Pattern, find_contact_pattern, find_faces_away
 from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, find_schedule_fault, list_poses_in_force
-from apo_bench.assembly.poses import Poses, compute_placements
+from apo_bench.assembly.poses import Poses, compute_placements, list_alternatives
 from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
 from apo_bench.assembly.reached import Outcome, ProbingResult, ReachedState, ReplayResult, SlipInHand, Snapshot
 from apo_bench.assembly.resting_contacts import (
@@ -126,6 +126,7 @@ __all__ = (
     "find_touch_points",
     "find_touched_contacts",
     "invert",
+    "list_alternatives",
     "list_outline_points",
     "list_poses_in_force",
     "make_measured_model",

@@ -4,7 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Meetings, Poses, ReachedState, Relation, compute_placements
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Meetings,
+    Poses,
+    ReachedState,
+    Relation,
+    compute_placements,
+    list_alternatives,
+)
 from apo_bench.geometry import Array, find_nearest_alike
 from apo_bench.judging.contacts import ContactCase, ContactJudge, compute_covered_shares
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
@@ -88,18 +97,12 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
     seen = _as_meant(assembly, final, true)
     count = len(references)
     common = Meetings(assembly).measure_overlaps(
-        ((c, at) for each in (seen, true) for at in _one_by_one(each, count) for c, _ in contacts),
+        ((c, at) for each in (seen, true) for at in list_alternatives(each) for c, _ in contacts),
     )
     reached, expected = common[: len(common) // 2], common[len(common) // 2 :]
     covered = compute_covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
     covered[[not overlap for overlap in expected]] = np.nan
     return np.asarray(covered.reshape(count, -1).min(axis=1, initial=1.0))
-
-
-def _one_by_one(poses: Poses, count: int) -> list[Poses]:
-    """The poses of each of several truths, of those of all, (d, 4, 4), or of parts that are in one place, (4, 4)."""
-    every = {part: np.broadcast_to(T, (count, 4, 4)) for part, T in poses.items()}
-    return [{part: T[i] for part, T in every.items()} for i in range(count)]
 
 
 def _as_meant(assembly: Assembly, poses: Poses, true: Poses) -> Poses:

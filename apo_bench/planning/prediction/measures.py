@@ -30,10 +30,11 @@ from apo_bench.assembly import (
     compute_apart_limit_mm,
     compute_deep_limit_mm,
     compute_placements,
+    list_alternatives,
 )
 from apo_bench.geometry import Array, Mate
 from apo_bench.planning.insertion.attach import Attach
-from apo_bench.planning.prediction.interference import depths_from_above, depths_on_way, physical_solids
+from apo_bench.planning.prediction.interference import Solids, depths_from_above, depths_on_way, physical_solids
 from apo_bench.planning.prediction.resting import enters, is_support, residual, residuals, resting_poses
 from apo_bench.planning.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
@@ -134,13 +135,29 @@ class _Act(NamedTuple):
     alone: Assembly
     """Without the other operations."""
     planned: Poses
-    """Every part where the plan has it after the operation."""
+    """Every part where the plan has it after the operation, or where each of several robots brings it."""
     rests: Poses
     """Every part where it will have come to rest."""
 
     @property
     def operation(self) -> Operation:
         return self.alone.operations[0]
+
+
+class DrawnMeasure(NamedTuple):
+    """A `Measure` of several draws of what is wrong with a robot."""
+
+    operation: int
+    kind: MeasureKind
+    size: Array
+    """(r,), as in `Measure`."""
+    allowed: Array
+    """(r,)."""
+    what: str = ""
+
+    def one(self) -> Measure:
+        """Of a single draw."""
+        return Measure(self.operation, self.kind, float(self.size[0]), float(self.allowed[0]), self.what)
 
 
 def measures(
@@ -150,43 +167,89 @@ def measures(
     attach: Sequence[Attach] = (),
     room_mm: float = 0.0,
     arm: Sequence[ArmMove] = (),
-    brought: Sequence[Poses] = (),
 ) -> Iterator[Measure]:
     """Everything that a plan is measured by, the most important first; always the same things of one schedule.
 
     Args:
         room_mm: Centres of mass are looked at this far aside, too.
         arm: As in `predict`; its reach is not measured.
-        brought: Every part when one is put, for each step of the schedule that puts one; empty: as planned. What falls
-            or leans is not asked of them.
     """
-    acts = tuple(_acts(plan, iter(brought)))
-    for act in acts if not brought else ():
-        yield Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
+    acts = tuple(_acts(plan))
+    yield from (_falls(act, room_mm) for act in acts)
     physical = physical_solids(plan.assembly, clearance_mm)
     for act in acts:
-        k, _, planned, _ = act
-        operation = act.operation
-        how = attach[k] if attach else None
-        deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.displaced_mm
-        fit = _fit(act, how, clearance_mm, thresholds)
-        yield fit
-        yield Measure(k, "side", _side_mm(act), thresholds.support_mm)
-        stays = not any(operation.main in later.moves for later in plan.assembly.operations[k + 1 :])
-        if stays and clearance_mm > thresholds.fit_margin_mm and not brought:
-            leans = imbalance(act.alone, operation, planned, 1e-3 * room_mm, ceilings=False)
-            yield Measure(k, "leans", leans, BALANCED)
-        for depth_m in depths_on_way(operation, planned, how, physical):
-            yield Measure(k, "on_way", 1e3 * depth_m, deep_mm)
-        for depth_m in depths_from_above(operation, planned, how, physical):
-            yield Measure(k, "from_above", 1e3 * depth_m, _BESIDE_MM)
-        for move in (move for move in arm if move.operation == k and not move.undo):
-            yield Measure(k, "gripper", move.struck_mm, thresholds.displaced_mm, move.struck)
-            yield from _tip(act, move, how, clearance_mm, thresholds, fit)
+        for each in _drawn(act, clearance_mm, thresholds, attach, arm, physical):
+            yield each.one()
+            if each.kind == "side":
+                yield from _leans(plan, act, clearance_mm, thresholds, room_mm)
 
 
-def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
+def standing_measures(plan: Plan, clearance_mm: float, thresholds: Thresholds) -> Iterator[Measure]:
+    """Those of `measures` that say whether a part would fall or lean."""
+    for act in _acts(plan):
+        yield _falls(act, 0.0)
+        yield from _leans(plan, act, clearance_mm, thresholds, 0.0)
+
+
+def drawn_measures(
+    plan: Plan,
+    clearance_mm: float,
+    thresholds: Thresholds,
+    attach: Sequence[Attach],
+    arm: Sequence[ArmMove],
+    brought: Sequence[Poses],
+) -> Iterator[DrawnMeasure]:
+    """What plans are measured by that robots with errors carry out, but for `standing_measures`.
+
+    Args:
+        arm: As in `predict`; its reach is not measured.
+        brought: Every part when one is put, (r, 4, 4) by r robots, for each step of the schedule that puts one.
+    """
+    physical = physical_solids(plan.assembly, clearance_mm)
+    for act in _acts(plan, brought):
+        yield from _drawn(act, clearance_mm, thresholds, attach, arm, physical)
+
+
+def _falls(act: _Act, room_mm: float) -> Measure:
+    return Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
+
+
+def _leans(plan: Plan, act: _Act, clearance_mm: float, thresholds: Thresholds, room_mm: float) -> Iterator[Measure]:
+    """Of a part that stays where it is put, if clearances leave room to lean."""
+    stays = not any(act.operation.main in later.moves for later in plan.assembly.operations[act.number + 1 :])
+    if stays and clearance_mm > thresholds.fit_margin_mm:
+        leans = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
+        yield Measure(act.number, "leans", leans, BALANCED)
+
+
+def _drawn(
+    act: _Act,
+    clearance_mm: float,
+    thresholds: Thresholds,
+    attach: Sequence[Attach],
+    arm: Sequence[ArmMove],
+    physical: Solids,
+) -> Iterator[DrawnMeasure]:
+    """What an operation is measured by, but for what falls or leans."""
+    k = act.number
+    how = attach[k] if attach else None
+    fit = _fit(act, how, clearance_mm, thresholds)
+    same = np.ones_like(fit.size)
+    yield fit
+    yield DrawnMeasure(k, "side", _side_mm(act), thresholds.support_mm * same)
+    deep_mm = thresholds.fit_margin_mm if act.operation.carries else thresholds.displaced_mm
+    for depths_m in depths_on_way(act.operation, act.planned, how, physical):
+        yield DrawnMeasure(k, "on_way", 1e3 * depths_m, deep_mm * same)
+    for depths_m in depths_from_above(act.operation, act.planned, how, physical):
+        yield DrawnMeasure(k, "from_above", 1e3 * depths_m, _BESIDE_MM * same)
+    for move in (move for move in arm if move.operation == k and not move.undo):
+        yield DrawnMeasure(k, "gripper", move.struck_mm * same, thresholds.displaced_mm * same, move.struck)
+        yield from _tip(act, move, how, clearance_mm, thresholds, fit)
+
+
+def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> Iterator[_Act]:
     """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along."""
+    given_poses = iter(brought)
     planned = rests = plan.start
     origins = dict[int, tuple[Array, Array]]()
     for (k, undo), target in zip(plan.schedule, plan.step_poses, strict=True):
@@ -196,7 +259,7 @@ def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
             planned, rests = (_put(alone, *pair) for pair in zip((planned, rests), origins[k], strict=True))
             continue
         origins[k] = planned[operation.main], rests[operation.main]
-        given = next(brought, None)
+        given = next(given_poses, None)
         planned, rests = [given] * 2 if given else (_put(alone, poses, target) for poses in (planned, rests))
         rests = resting_poses(alone, operation, rests)
         yield _Act(k, alone, planned, rests)
@@ -207,25 +270,29 @@ def _put(alone: Assembly, before: Poses, goal: Array) -> Poses:
     return compute_placements(alone, before, goal[None])[0]
 
 
-def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
+def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> DrawnMeasure:
     """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
     lengths = clearance_mm, thresholds.fit_margin_mm, thresholds.support_mm
-    sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
-    apart = list[tuple[float, float, Contact]]()
     entering = [contact for contact in act.operation.contacts if enters(act.alone, contact)]
-    for contact, (deep_m, apart_m) in zip(entering, _misfits_m(act, entering, how), strict=True):
-        limit = compute_deep_limit_mm(act.alone, contact, *lengths)
-        sides.append((1e3 * deep_m, limit))
-        apart.append((1e3 * apart_m, limit, contact))
-    worst = max(sides, key=_excess)
-    # Faces may be at least as far apart as deep; how much farther, a linear program says, and only where it may matter.
-    for size, limit, contact in apart:
-        if size > limit:
-            if size - limit <= _excess(worst) + _ROUNDING_MM:
-                continue
-            limit = compute_apart_limit_mm(act.alone, contact, 0, act.planned, *lengths)
-        worst = max(worst, (size, limit), key=_excess)
-    return Measure(act.number, "fit", *worst)
+    limits = [compute_deep_limit_mm(act.alone, contact, *lengths) for contact in entering]
+    known = Meetings(act.alone)
+    alternatives = list_alternatives(act.planned)
+    known.measure((contact, poses) for poses in alternatives for contact in entering)
+    worst = []
+    for poses in alternatives:
+        off = [_misfit_mm(act, contact, known, poses, how) for contact in entering]
+        sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
+        sides += [(deep, limit) for (deep, _), limit in zip(off, limits, strict=True)]
+        most = max(sides, key=_excess)
+        # Faces may be at least as far apart as deep; how much farther takes a linear program, where it may matter.
+        for contact, (_, apart), limit in zip(entering, off, limits, strict=True):
+            if apart > limit:
+                if apart - limit <= _excess(most) + _ROUNDING_MM:
+                    continue
+                limit = compute_apart_limit_mm(act.alone, contact, 0, poses, *lengths)
+            most = max(most, (apart, limit), key=_excess)
+        worst.append(most)
+    return DrawnMeasure(act.number, "fit", *np.array(worst).T)
 
 
 def _excess(side: tuple[float, float]) -> float:
@@ -234,34 +301,33 @@ def _excess(side: tuple[float, float]) -> float:
 
 
 def _tip(
-    act: _Act, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds, planned: Measure
-) -> Iterator[Measure]:
+    act: _Act, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds, planned: DrawnMeasure
+) -> Iterator[DrawnMeasure]:
     """Of what enters: how far off the arm alone is, which play must take, and how far with what is planned wrong."""
     as_planned = not move.beside_mm and np.array_equal(move.sag, np.eye(4))
     if as_planned or not any(enters(act.alone, contact) for contact in act.operation.contacts):
         return
     moved = {part: move.sag @ act.planned[part] for part in act.operation.moves}
     off = _fit(act._replace(planned=MappingProxyType({**act.planned, **moved})), how, clearance_mm, thresholds)
-    own = max(0.0, off.size - planned.size) + move.beside_mm
-    yield Measure(act.number, "own", own, max(off.allowed - thresholds.fit_margin_mm, 0.0))
-    yield Measure(act.number, "tip", off.size + move.beside_mm, off.allowed)
+    own = np.maximum(0.0, off.size - planned.size) + move.beside_mm
+    yield DrawnMeasure(act.number, "own", own, np.maximum(off.allowed - thresholds.fit_margin_mm, 0.0))
+    yield DrawnMeasure(act.number, "tip", off.size + move.beside_mm, off.allowed)
 
 
-def _misfits_m(act: _Act, contacts: Sequence[Contact], how: Attach | None) -> list[tuple[float, float]]:
-    """How deep and how far apart contacts are across the way in at most; of round faces, twice, how far apart the axes
-    are, across it.
+def _misfit_mm(act: _Act, contact: Contact, known: Meetings, poses: Poses, how: Attach | None) -> tuple[float, float]:
+    """How deep and how far apart a contact is across the way in at most, [mm]; of round faces, twice, how far apart the
+    axes are, across it.
     """
-    way = None if how is None else act.planned[act.operation.main][:3, :3] @ how.direction
-    out = []
-    for contact, lie in zip(contacts, Meetings(act.alone).measure((c, act.planned) for c in contacts), strict=True):
-        if classify_contact(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
-            e, n = residual(act.alone, contact, lie, act.planned)
-            along = way is not None and abs(n @ way) >= _ACROSS
-            out.append((0.0, 0.0) if along else (max(0.0, -float(e.min())), max(0.0, float(e.max()))))
-        else:
-            assert isinstance(lie, Mate)
-            out.append((_off_axis_m(lie, way),) * 2)
-    return out
+    way = None if how is None else poses[act.operation.main][:3, :3] @ how.direction
+    (lie,) = known.measure([(contact, poses)])
+    if classify_contact(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
+        e, n = residual(act.alone, contact, lie, poses)
+        if way is not None and abs(n @ way) >= _ACROSS:
+            return 0.0, 0.0
+        return max(0.0, -1e3 * float(e.min())), max(0.0, 1e3 * float(e.max()))
+    assert isinstance(lie, Mate)
+    off = 1e3 * _off_axis_m(lie, way)
+    return off, off
 
 
 def _off_axis_m(lie: Mate, way: Array | None) -> float:
@@ -273,7 +339,12 @@ def _off_axis_m(lie: Mate, way: Array | None) -> float:
     return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
 
 
-def _side_mm(act: _Act) -> float:
-    """Largest |e| of the sides that the operation slides onto others, once its part rests."""
-    sides = [c for c in act.operation.contacts if not enters(act.alone, c) and not is_support(act.alone, c, act.rests)]
-    return max((1e3 * float(np.abs(e).max()) for e, _ in residuals(act.alone, sides, act.rests)), default=0.0)
+def _side_mm(act: _Act) -> Array:
+    """Largest |e| of the sides that the operation slides onto others, once its part rests, of each draw, (r,)."""
+    touched = [contact for contact in act.operation.contacts if not enters(act.alone, contact)]
+    found = residuals(act.alone, touched, act.rests)
+    worst = np.zeros(len(found))
+    for i, contact in enumerate(touched):
+        most = np.array([1e3 * np.abs(each[i][0]).max() for each in found])
+        worst = np.maximum(worst, np.where(is_support(act.alone, contact, act.rests), 0.0, most))
+    return worst
