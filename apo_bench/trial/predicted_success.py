@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -175,7 +175,13 @@ def _by_arm(
 
 def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
     """Standard normal numbers of one of the robots that are drawn, of one stream."""
-    return np.asarray(_spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)[draw])
+    return np.asarray(_robot_draws(which, shape)[draw])
+
+
+@lru_cache(maxsize=16)
+def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
+    """Those of all robots, (robots, *shape); always the same."""
+    return _spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)
 
 
 def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
