@@ -46,7 +46,7 @@ types: $(VENV)/.installed-dev
 	$(BIN)/mypy
 
 site: $(VENV)/.installed-dev
-	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir build/site  # `--quiet` would not count warnings
 
 style: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

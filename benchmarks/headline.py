@@ -33,7 +33,7 @@ from benchmarks.headline_summary import block, summarise
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"
 PAGE = ROOT / "docs" / "results" / "headline.md"
-FIGURE = ROOT / "docs" / "pictures" / "headline.png"
+FIGURE = ROOT / "docs" / "pictures" / "headline.svg"
 BLOCKS = {
     ROOT / "docs" / "index.md": ("pictures", "results/headline.md"),
 }

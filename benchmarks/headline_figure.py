@@ -1,8 +1,8 @@
-"""The figure of the headline: success over the error of the poses, and two panels of limits."""
+"""The figure of the headline: success over the noise level, and what limits it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,121 +11,145 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 from apo_bench.benchmark.analysis import Rate
 from apo_bench.benchmark.report.figures.style import INK, RULE, SOFT
-from benchmarks.headline_summary import NOISE, NOISES, WORDS, Summary, pool, robot_rate
+from apo_bench.records import TrialConfig
+from benchmarks.headline_summary import NOISE, NOISES, Summary, pool, robot_rate
 
-COLOURS = {
-    "uncorrected": "#d55e00",
-    "spiral-search": "#c2186f",
-    "contact-robust": "#332288",
-    "contact": "#332288",
-    "oracle": SOFT,
-    "contact-robust+spiral": "#00745a",
+STYLES = {
+    "uncorrected": ("#d55e00", "o", "-"),
+    "spiral-search": ("#c2186f", "s", "-"),
+    "snap": ("#a6761d", "^", "--"),
+    "nominal": ("#7a7a1f", "D", ":"),
+    "paper": ("#0072b2", "v", "--"),
+    "contact": ("#00745a", "P", "-."),
+    "contact-robust": ("#332288", "o", "-"),
+    "contact-robust+spiral": ("#00745a", "X", "-"),
+    "oracle": (SOFT, "*", "--"),
 }
-LINES = ("uncorrected", "spiral-search", "snap", "nominal")
-DASHES: Any = {"snap": (0, (4, 2)), "nominal": (0, (1, 1.2))}
-FONT = 12.5
-NAME_HEIGHT = 5.5  # of a name beside a line, in percent of the axis
+"""Colour, marker and dashes of a method."""
+OUTLIERS = ("uncorrected", "paper", "contact", "contact-robust")
+FONT = 12.0
+NAME_HEIGHT = 5.5  # of a name next to a line, in percent of the axis
+APART = 2.4  # coinciding lines are drawn this far from each other, in percent of the axis
 
 
 def draw_summary(summary: Summary, path: Path) -> None:
-    """Draw success over the noise level, and the panels of limits."""
-    settings: Any = {"font.size": FONT, "font.family": "DejaVu Sans", "text.color": INK, "axes.edgecolor": RULE}
+    """Draw success over the noise level without and with human error, and two panels of limits."""
+    settings: Any = {"font.size": FONT, "text.color": INK, "axes.edgecolor": RULE, "svg.hashsalt": "headline"}
     with plt.rc_context(settings):
-        figure = plt.figure(figsize=(11.0, 6.6), layout="constrained")
-        places = figure.add_gridspec(2, 2, width_ratios=(1.12, 1.0), height_ratios=(1.1, 1.0))
-        draw_noise_levels(figure.add_subplot(places[:, 0]), summary)
-        draw_outliers(figure.add_subplot(places[0, 1]), summary)
-        draw_robot_errors(figure.add_subplot(places[1, 1]), summary)
-        figure.savefig(path, dpi=130)
+        figure, axes = plt.subplots(2, 2, figsize=(12.5, 10.0), layout="constrained", height_ratios=(1.2, 1.0))
+        draw_noise_levels(axes[0, 0], summary)
+        draw_human_error(axes[0, 1], summary)
+        draw_outliers(axes[1, 0], summary)
+        draw_robot_errors(axes[1, 1], summary)
+        figure.get_layout_engine().set(wspace=0.06, hspace=0.05)
+        figure.savefig(path, metadata={"Date": None})
         plt.close(figure)
 
 
 def draw_noise_levels(axis: Any, summary: Summary) -> None:
-    """Draw lines over the noise level; names stand at the left, where falling lines are apart."""
-    methods = (*LINES, summary.corrected)
-    plain = [cell for cell in summary.cells if cell.human_error_scale == 0.0 and cell.method in methods]
-    levels = sorted({cell.noise_mm for cell in plain if cell.noise_mm > 0.0})
-    names = list[tuple[float, str]]()
-    for method in methods:
-        drawn = [(k, rate) for k, level in enumerate(levels) if (rate := pool(summary.cells, method, level))]
-        loud = method in COLOURS
-        draw_line(axis, drawn, COLOURS.get(method, SOFT), 2.8 if loud else 1.6, DASHES.get(method, "-"), band=loud)
-        if method == summary.corrected:
-            label = {"color": COLOURS[method], "fontweight": "bold", "va": "top", "ha": "center"}
-            axis.text(len(levels) / 2, 95, WORDS[method], **label)
-        elif drawn:
-            names.append((percents(drawn)[0], method))
-    for height, (_, method) in zip(spread([y for y, _ in sorted(names)]), sorted(names), strict=True):
-        label = {"color": COLOURS.get(method, SOFT), "fontweight": "bold", "va": "center", "ha": "right"}
-        axis.text(-0.2, height, WORDS[method], **label)
+    """Draw every method over the noise level, without human error; the oracle has none."""
+    plain = [cell for cell in summary.cells if _is_plain(cell) and cell.human_error_scale == 0.0]
+    levels = sorted({cell.noise_mm for cell in plain})
+    lines = {
+        method: [(k, rate) for k, level in enumerate(levels) if (rate := pool(summary.cells, method, level))]
+        for method in STYLES
+        if method in {cell.method for cell in plain} and "+" not in method
+    }
+    draw_lines(axis, lines)
     axis.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
-    axis.set_xlim(-2.3, len(levels) - 0.8)
-    axis.set_xlabel("error of the observed poses [mm and degrees]")
-    axis.set_title("Observed, searched, corrected", loc="left", fontweight="bold", fontsize=FONT + 2)
-    scale_to_percent(axis)
+    axis.set_xlim(-0.3, len(levels) + 2.1)
+    axis.set_xlabel("noise [mm and degrees, 1 sigma per axis]", loc="left")
+    set_title(axis, "All methods over the noise level")
 
 
-def spread(heights: Sequence[float]) -> list[float]:
-    """Return heights in rising order, moved down from the top until names there do not touch."""
+def draw_human_error(axis: Any, summary: Summary) -> None:
+    """Write the success of every method that ran with human error into a table whose cells are shaded."""
+    shaky = [cell for cell in summary.cells if _is_plain(cell) and cell.human_error_scale == 1.0]
+    levels = sorted({cell.noise_mm for cell in shaky})
+    shares = np.full((len({cell.method for cell in shaky}), len(levels)), np.nan)
+    methods = sorted({cell.method for cell in shaky}, key=lambda method: (_success(shaky, method, 2.0), method))
+    for i, method in enumerate(methods):
+        for j, level in enumerate(levels):
+            shares[i, j] = _success(shaky, method, level)
+            if not np.isnan(shares[i, j]):
+                color = "white" if shares[i, j] > 60 else INK
+                axis.text(j, i, f"{shares[i, j]:.0f}", ha="center", va="center", color=color)
+    axis.pcolormesh(shares, cmap="Purples", vmin=0, vmax=130, edgecolors="white", linewidth=2)
+    for text in axis.texts:
+        text.set_position(np.array(text.get_position()) + 0.5)
+    axis.set_yticks(np.arange(len(methods)) + 0.5, methods)
+    axis.set_xticks(np.arange(len(levels)) + 0.5, [f"{level:g}" for level in levels])
+    axis.set_xlabel("noise [mm and degrees]; empty: not run", loc="left")
+    axis.tick_params(length=0)
+    axis.spines[:].set_visible(False)
+    set_title(axis, "With human error: success [%]")
+
+
+def _is_plain(cell: Any) -> bool:
+    return bool(cell.noise == TrialConfig.noise and cell.robot_error == TrialConfig.robot_error)
+
+
+def _success(cells: Sequence[Any], method: str, noise_mm: float) -> float:
+    """Return the success over scenarios in percent; not a number where the method did not run."""
+    own = [cell for cell in cells if (cell.method, cell.noise_mm) == (method, noise_mm)]
+    trials = sum(cell.trials for cell in own)
+    return 100 * sum(cell.successes for cell in own) / trials if trials else float("nan")
+
+
+def spread(heights: Sequence[float], gap: float = NAME_HEIGHT) -> list[float]:
+    """Return heights in rising order, moved down from the top until they are a gap apart."""
     placed: list[float] = []
     for height in reversed(heights):
-        placed.append(min(height, placed[-1] - NAME_HEIGHT if placed else 100.0))
+        placed.append(min(height, placed[-1] - gap if placed else height))
     return placed[::-1]
 
 
 def draw_outliers(axis: Any, summary: Summary) -> None:
-    """Draw bars by noise and method, with their percentages."""
+    """Draw bars by noise and method, with their percentages and intervals."""
     y = 0.0
-    ticks = list[float]()
-    names = list[str]()
+    ticks: dict[float, str] = {}
     for noise, title in NOISES.items():
-        axis.text(0, y, title, va="center", fontweight="bold", fontsize=FONT - 1.5)
+        axis.text(0, y, title, va="center", fontweight="bold", fontsize=FONT - 1)
         y -= 1
-        for method in ("uncorrected", "paper", "contact", "contact-robust"):
+        for method in OUTLIERS:
             rate = pool(summary.cells, method, NOISE, noise=noise)
             if rate is None:
                 continue
-            value = 100 * rate.successes / rate.trials
             low, high = (100 * x for x in rate.interval)
-            color = COLOURS[method] if method == summary.corrected else "#9aa3b2"
-            axis.barh(y, value, height=0.72, color=color)
+            value = 100 * rate.successes / rate.trials
+            axis.barh(y, value, height=0.72, color=STYLES[method][0], alpha=0.85)
             axis.plot([low, high], [y, y], color=INK, linewidth=1.2)
-            axis.text(max(high, value) + 2, y, f"{value:.0f} %", va="center", fontsize=FONT - 1)
-            ticks.append(y)
-            names.append(method)
+            axis.text(max(high, value) + 2, y, f"{value:.0f} %", va="center")
+            ticks[y] = method
             y -= 1
         y -= 0.4
-    axis.set_yticks(ticks, names, fontsize=FONT - 1)
+    axis.set_yticks(list(ticks), list(ticks.values()))
     axis.set_ylim(y + 0.6, 0.6)
-    axis.set_xlim(0, 118)
-    axis.set_xticks([])
-    axis.set_title("Limits: outliers", pad=10, loc="left", fontweight="bold", fontsize=FONT + 2)
+    axis.set_xlim(0, 112)
+    axis.set_xticks([0, 25, 50, 75, 100])
+    axis.set_xlabel(f"success [%] at {NOISE:g} mm and {NOISE:g} degree", loc="left")
     axis.tick_params(length=0)
     axis.spines[["top", "right", "bottom"]].set_visible(False)
+    set_title(axis, "Limits: outliers")
 
 
 def draw_robot_errors(axis: Any, summary: Summary) -> None:
     """Draw lines over the robot's own error."""
     kinds = {cell.robot_error for cell in summary.cells if cell.robot_error.startswith("hand_eye:")}
     errors = ["none", *sorted(kinds, key=size_mm)]
-    places = {
-        summary.corrected: (0.03, 0.22, "left"),
-        f"{summary.corrected}+spiral": (0.99, 0.93, "right"),
-        "oracle": (0.03, 0.08, "left"),
+    lines = {
+        method: [(k, rate) for k, error in enumerate(errors) if (rate := robot_rate(summary, method, error))]
+        for method in ("oracle", summary.corrected, f"{summary.corrected}+spiral")
     }
-    for method, (x, y, side) in places.items():
-        drawn = [(k, rate) for k, error in enumerate(errors) if (rate := robot_rate(summary, method, error))]
-        color = COLOURS.get(method, SOFT)
-        draw_line(axis, drawn, color, 2.6, (0, (1.2, 1.2)) if method == "oracle" else "-", band=True)
-        axis.text(x, y, WORDS.get(method, method), color=color, fontweight="bold", ha=side, transform=axis.transAxes)
+    draw_lines(axis, {method: drawn for method, drawn in lines.items() if drawn})
     axis.set_xticks(range(len(errors)), ["0", *(f"{size_mm(error):g}" for error in errors[1:])])
-    axis.set_xlabel("hand-eye error [mm, and 0.2 degrees per mm]")
-    axis.set_title("Limits: the robot's own error", loc="left", fontweight="bold", fontsize=FONT + 2)
-    axis.set_xlim(-0.15, len(errors) - 0.85)
-    scale_to_percent(axis)
+    axis.set_xlabel("hand-eye error [mm, and 0.2 degrees per mm]", loc="left")
+    axis.set_xlim(-0.15, len(errors) + 1.6)
+    set_title(axis, "Limits: the robot's own error")
 
 
 def size_mm(error: str) -> float:
@@ -133,26 +157,42 @@ def size_mm(error: str) -> float:
     return float(error.partition(":")[2].partition("/")[0])
 
 
-def draw_line(
-    axis: Any, drawn: Sequence[tuple[int, Rate]], color: str, width: float, dashes: Any, *, band: bool
-) -> None:
-    """Draw a line, and the band of its 95 % intervals."""
-    at = [k for k, _ in drawn]
-    axis.plot(at, percents(drawn), color=color, linewidth=width, linestyle=dashes, marker="o", clip_on=False)
-    if band:
+def draw_lines(axis: Any, lines: Mapping[str, Sequence[tuple[int, Rate]]]) -> None:
+    """Draw a line with the band of its 95 % intervals for each method, and its name where it ends.
+
+    Lines that coincide are drawn `APART`.
+    """
+    shown: dict[str, dict[int, float]] = {method: {} for method in lines}
+    for k in sorted({k for drawn in lines.values() for k, _ in drawn}):
+        here = sorted((percent(rate), method) for method, drawn in lines.items() for at, rate in drawn if at == k)
+        for height, (_, method) in zip(spread([value for value, _ in here], APART), here, strict=True):
+            shown[method][k] = height
+    ends = sorted((max(heights), heights[max(heights)], method) for method, heights in shown.items())
+    for method, drawn in lines.items():
+        color, marker, dashes = STYLES[method]
+        at = list(shown[method])
+        axis.plot(at, list(shown[method].values()), color=color, marker=marker, linestyle=dashes, clip_on=False)
         low, high = ([100 * getattr(rate.interval, side) for _, rate in drawn] for side in ("low", "high"))
-        axis.fill_between(at, low, high, color=color, alpha=0.12, linewidth=0)
-
-
-def percents(drawn: Sequence[tuple[int, Rate]]) -> list[float]:
-    """Return success rates in percent."""
-    return [100 * rate.successes / rate.trials for _, rate in drawn]
-
-
-def scale_to_percent(axis: Any) -> None:
-    """Let the axis of success run from 0 to 100 %."""
-    axis.set_ylim(-2, 103)
-    axis.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100 %"])
+        axis.fill_between(at, low, high, color=color, alpha=0.10, linewidth=0)
+    for last in {k for k, _, _ in ends}:
+        group = sorted((height, method) for k, height, method in ends if k == last)
+        names = spread([min(y, 100.0) + NAME_HEIGHT * (last == 0) for y, _ in group])
+        for height, (_, method) in zip(names, group, strict=True):
+            label = {"color": STYLES[method][0], "fontweight": "bold", "va": "center", "ha": "left"}
+            axis.text(last + 0.2 * (last > 0), height, method, **label)
+    axis.set_ylim(-15, 108)
+    axis.set_yticks([0, 25, 50, 75, 100])
+    axis.set_ylabel("success [%]")
     axis.grid(axis="y", color=RULE)
     axis.tick_params(length=0)
     axis.spines[["top", "right"]].set_visible(False)
+
+
+def percent(rate: Rate) -> float:
+    """Return a success rate in percent."""
+    return 100 * rate.successes / rate.trials
+
+
+def set_title(axis: Any, title: str) -> None:
+    """Set the title of a panel, at its left."""
+    axis.set_title(title, loc="left", fontweight="bold", fontsize=FONT + 2)

@@ -20,16 +20,15 @@ COMPARED = ("contact", "contact-robust")  # with `paper`, seed by seed
 ROBOT_METHODS = {"oracle": 0.0, "contact-robust": NOISE, "contact-robust+spiral": NOISE}
 """Methods that ran with errors of the robot, and their noise in mm and degrees."""
 OUTLIERS = (
-    f"{NOISE:g} mm and degree, no human error. `outliers` makes 10 % of the errors ten times as large and misses 2 % "
-    "of the operations. `megapose-tless` was measured of a pose estimator: it misses 26 % of the parts and has gross "
-    "errors in 24 % of the others ([noise models](../reference/noise-models.md)). Most methods do not correct where "
-    "an operation was not observed."
+    f"Noise of {NOISE:g} mm and degree, no human error. `outliers` makes 10 % of the errors ten times as large and "
+    "misses 2 % of the operations. `megapose-tless` was measured on a pose estimator: it misses 26 % of the parts and "
+    "has gross errors in 24 % of the others ([noise models](../reference/noise-models.md)). Most methods do not "
+    "correct if an operation was not observed."
 )
 ROBOT = (
-    f"{NOISE:g} mm and degree, no human error. Every trial draws a [robot "
-    "error](../guide/robot-error.md#errors-of-the-robot); the numbers are standard deviations in mm and "
-    "degrees. Contacts correct the errors of the camera, not those of the robot: `oracle`, which has the true poses, "
-    "fails as well."
+    f"Noise of {NOISE:g} mm and degree, no human error. Every trial draws a [robot "
+    "error](../guide/robot-error.md#errors-of-the-robot), in standard deviations, mm and degrees. Contacts correct the "
+    "errors of the camera, not those of the robot: `oracle`, which has the true poses, fails as well."
 )
 OLDER = " **`benchmarks/headline.toml` has changed since.**"
 Words = Callable[[ConditionResult], tuple[str, ...]]
@@ -53,10 +52,9 @@ def page(
         "",
         "## All rates",
         "",
-        "Success in percent: the finished assembly is right ([the judge](../how/judge.md)); in brackets: also built as "
-        "demonstrated, where that is less. Columns are the noise in mm and degrees (1 sigma per axis). The reference "
-        "describes the [methods](../reference/methods.md). All methods have the same seeds. "
-        f"{_widths(least)} `benchmarks/results/headline/table.csv` has all intervals.",
+        "Success in percent ([the judge](../how/judge.md)); in brackets: also built as demonstrated, where that is "
+        "less. Columns are the noise in mm and degrees (1 sigma per axis). All [methods](../reference/methods.md) have "
+        f"the same seeds. {_widths(least)} `benchmarks/results/headline/table.csv` has all intervals.",
         "",
         "### Without human error",
         "",
@@ -64,8 +62,8 @@ def page(
         "",
         "### With human error",
         "",
-        "The human puts parts 1.5 to 4 mm aside and adjusts them later, as in the paper. `uncorrected` cannot succeed: "
-        "the clearance is 0.25 mm. A search cannot undo what stands aside before anything is inserted.",
+        "The human puts parts 1.5 to 4 mm aside and adjusts them later, as in the paper. The clearance is 0.25 mm, so "
+        "`uncorrected` fails. A search cannot move a part that stands aside.",
         "",
         *rates([c for c in main if c.human_error_scale == 1.0], ("scenario", "method"), _name, lambda c: c.noise_mm),
         "",
@@ -87,7 +85,7 @@ def page(
         "",
         *_differences(pairs),
         "",
-        "## Run",
+        "## Measurement",
         "",
         _describe_run(ran, least),
         "",
@@ -146,9 +144,9 @@ def _differences(pairs: Sequence[PairedComparison]) -> list[str]:
         lines.append((*place, p.pairs, p.only_method, p.only_reference, difference, f"{p.p_adjusted:.2g}"))
     heads = ("scenario", "human error", "noise, mm", "noise model", "method", "pairs", "it alone", "`paper` alone")
     return [
-        f"Corrected poses against those of `paper` over the same seeds, in the {len(apart)} of {len(compared)} "
-        "conditions in which any seed ends differently: at how many seeds one method alone was right, the difference "
-        "of the rates in points with Tango's 95 % interval, and McNemar's exact p, adjusted for all (Holm).",
+        f"Corrected poses and those of `paper` over the same seeds, in the {len(apart)} of {len(compared)} conditions "
+        "in which any seed ends differently. The columns count the seeds at which one method alone succeeded, then "
+        "give the difference in points with Tango's 95 % interval, and McNemar's exact p, adjusted for all (Holm).",
         "",
         *table((*heads, "difference", "p adjusted"), lines),
     ]
@@ -157,13 +155,12 @@ def _differences(pairs: Sequence[PairedComparison]) -> list[str]:
 def _describe_run(ran: Mapping[str, Any], least: int) -> str:
     versions = ran["versions"]
     return (
-        f"Written by `python benchmarks/headline.py` from the trials of `{ran['command']}`: {ran['rows']} trials, "
-        f"{ran['replays']} replays, at least {least} trials in each condition, friction grasp, clearance of 0.25 mm "
-        f"per side, fidelity `{ran['grids'][0]['fidelity']}`; {ran['simulated_hours']} hours simulated or passed over "
-        f"in {ran['worker_hours'] / ran['workers']:.2f} hours by {ran['workers']} process(es) on two cores. MuJoCo "
-        f"{versions['mujoco']}, mink {versions['mink']}, NumPy {versions['numpy']}, Python {ran['python']}. "
-        "`benchmarks/results/headline/run.json` has the rest; `rows.jsonl.xz` in the same folder has the trials "
-        f"without the poses reached.{'' if is_up_to_date(ran) else OLDER}"
+        f"Written by `python benchmarks/headline.py` from the trials of `{ran['command']}`: {ran['rows']} trials, at "
+        f"least {least} in each condition. Friction grasp, clearance of 0.25 mm per side, fidelity "
+        f"`{ran['grids'][0]['fidelity']}`. {ran['workers']} process(es) simulated {ran['simulated_hours']} hours in "
+        f"{ran['worker_hours'] / ran['workers']:.2f}. MuJoCo {versions['mujoco']}, mink {versions['mink']}, NumPy "
+        f"{versions['numpy']}, Python {ran['python']}. `benchmarks/results/headline/run.json` has the rest, and "
+        f"`rows.jsonl.xz` there the trials.{'' if is_up_to_date(ran) else OLDER}"
     )
 
 
@@ -190,9 +187,8 @@ def describe_fidelity(full: Path, near_contact: Path) -> list[str]:
     return [
         "## Fidelity",
         "",
-        "The same trials at fidelity `full`, which simulates every step of every motion: how many have the same "
-        "verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of one "
-        "seed share their random numbers; the last column counts the seeds with the same verdict in all trials.",
+        "The same trials at fidelity `full`: how many have the same verdict (with Wilson's 95 % interval), and how "
+        "many the same verdict, stage and code. The last column counts the seeds with the same verdict in all trials.",
         "",
         *table((*heads, "right at `full` alone", "right at `near-contact` alone", "seeds"), lines),
     ]

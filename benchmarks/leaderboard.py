@@ -4,8 +4,8 @@ Entries are those of `apo-bench score METHOD --out benchmarks/entries/METHOD.jso
 which are not committed.
 
 Writes docs/results/leaderboard.md with its figure, and its first ten lines into the README. Tracks in which the three
-best methods lie within two points of each other, `oracle` apart, tell methods apart no more: they are there for
-regression tests and say `overall = false`; --marks says which these are.
+best methods lie within two points of each other, without `oracle`, no longer separate methods: they are regression
+tests and have `overall = false`; --marks lists them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def entries() -> list[Entry]:
 
 
 def for_regression(of: Sequence[Entry]) -> Iterator[str]:
-    """Tracks that tell the best methods apart no more, by name."""
+    """Tracks that no longer separate the best methods, by name."""
     for name in sorted({name for entry in of for name in entry.tracks}):
         scores = [e.tracks[name].score for e in of if name in e.tracks and e.name != "oracle"]
         best = sorted(scores, reverse=True)[:BEST]
@@ -59,16 +59,29 @@ def in_readme(text: str) -> str:
     return f"{before}{BEGIN}\n{first_lines()}\n{END}{rest.split(END)[1]}"
 
 
+def outcome(of: Sequence[Entry]) -> str:
+    """Two sentences: how good the best methods are that do not have the true poses, and the bound."""
+    scores = {line.entry.name: line.entry.overall[0] for line in ranked(of) if line.entry.overall}
+    bound = scores.pop("oracle")
+    (first, best), (second, next_best) = [*scores.items()][:2]
+    return (
+        f"`{first}` leads with a score of {best:.1f} of 100, before `{second}` with {next_best:.1f}. The bound is "
+        f"`oracle`, which has the true poses, with {bound:.1f}.\n\n"
+    )
+
+
 def write_page(page: Path) -> None:
-    """The page and its figure, and what the rows were simulated with."""
-    write_leaderboard(entries(), page)
-    versions = sorted({entry.versions["mujoco"] for entry in entries()})
-    page.write_text(with_mujoco(page.read_text(encoding="utf-8"), versions), encoding="utf-8")
+    """The page and its figure, with what came out and what the rows were simulated with."""
+    of = entries()
+    write_leaderboard(of, page)
+    head, rest = page.read_text(encoding="utf-8").split("\n\n", 1)
+    text = with_mujoco(f"{head}\n\n{outcome(of)}{rest}", sorted({entry.versions["mujoco"] for entry in of}))
+    page.write_text(text, encoding="utf-8")
 
 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--marks", action="store_true", help="only say which tracks are for regression tests")
+    asked.add_argument("--marks", action="store_true", help="list the tracks that are regression tests")
     if asked.parse_args().marks:
         print("\n".join(for_regression(entries())))
         return

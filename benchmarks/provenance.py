@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -22,16 +21,9 @@ def count_revisions(folders: Iterable[Path]) -> int:
     return len({run["revision"] for run in _runs(folders)})
 
 
-def versions_of(page: str) -> list[str]:
-    """Return the versions of MuJoCo that a page names."""
-    found = re.search(r"^\*Simulated with MuJoCo (.*)\.\*$", page, re.MULTILINE)
-    return found[1].split(" and ") if found else []
-
-
 def with_mujoco(page: str, versions: Iterable[str]) -> str:
-    """Return the page with the versions of MuJoCo below its heading."""
-    heading = next(line for line in page.splitlines() if line.startswith("# "))
-    return page.replace(f"{heading}\n", f"{heading}\n\n*Simulated with MuJoCo {' and '.join(versions)}.*\n", 1)
+    """Return the page with the versions of MuJoCo in its last line."""
+    return f"{page.rstrip()}\n\n*Simulated with MuJoCo {' and '.join(versions)}.*\n"
 
 
 def share_of_sweep(trials: int, *sweeps: Path) -> str:

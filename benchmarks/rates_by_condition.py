@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from apo_bench.benchmark.analysis import Rate
+from apo_bench.benchmark.analysis import Rate, compute_wilson_interval
 from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_folder import read_records
 
@@ -37,6 +37,17 @@ def counted(rate: Rate | None) -> str:
     if rate is None or not rate.trials:
         return ""
     return f"{rate.successes} of {rate.trials} ({100 * rate.interval.low:.0f} to {100 * rate.interval.high:.0f} %)"
+
+
+def fraction(rate: Rate | None) -> str:
+    """Return `19/20`; nothing where no trial ran."""
+    return f"{rate.successes}/{rate.trials}" if rate is not None and rate.trials else ""
+
+
+def widths(*trials: int) -> str:
+    """Return how wide Wilson's 95 % intervals are at so many trials, in a sentence."""
+    at = (f"{n} of {n} is {100 * compute_wilson_interval(n, n).low:.0f} to 100 %" for n in trials)
+    return f"Wilson's 95 % intervals: {', '.join(at)}."
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:

@@ -1,7 +1,7 @@
 """Write how often `contact-robust` succeeds under outliers: `python benchmarks/robust.py FOLDER [FOLDER ...]`.
 
 Takes sweeps of benchmarks/robust.toml, whole or not, and writes results/robust.csv, one line for each condition, and
-the last part of docs/results/robust.md.
+docs/results/robust.md but for its part on wrong contacts.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ import argparse
 import csv
 import sys
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.benchmark.analysis import Rate, compute_tango_interval
+from apo_bench.benchmark.analysis import Rate, compute_tango_interval, format_percent
 from apo_bench.records import TrialRecord
-from benchmarks.provenance import mujoco_of, share_of_sweep, with_mujoco
-from benchmarks.rates_by_condition import counted, group, rate_of, read_judged, table
+from benchmarks.provenance import mujoco_of, share_of_sweep
+from benchmarks.rates_by_condition import counted, fraction, group, rate_of, read_judged, table
 
 ROOT = Path(__file__).parents[1]
 SWEEP = ROOT / "benchmarks" / "robust.toml"
@@ -31,7 +31,7 @@ NOISES = {
     "outliers": "10 % ten times as large, 2 % missed",
 }
 WITHOUT_OUTLIERS = "isotropic"
-HEADING = "# In simulation"
+WRONG_CONTACTS = "<!-- wrong contacts -->"  # where the part of wrong_contacts.py begins
 
 
 class Place(NamedTuple):
@@ -56,10 +56,9 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, "trials", "successes"])
         writer.writerows([*place, rate.trials, rate.successes] for place, rate in sorted(rates.items()))
-    before = PAGE.read_text(encoding="utf-8").partition(f"#{HEADING}\n")[0]
-    # The page has parts of other scripts before this one, so this heading becomes one of the second order.
-    part = with_mujoco("\n".join(page(rows, rates)) + "\n", mujoco_of(folders))
-    PAGE.write_text(f"{before}#{part}", encoding="utf-8")
+    _, mark, rest = PAGE.read_text(encoding="utf-8").partition(WRONG_CONTACTS)
+    written = "\n".join(page(rows, rates, mujoco_of(folders)))
+    PAGE.write_text(f"{written}\n\n{mark}{rest}", encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
 
@@ -76,21 +75,25 @@ def place_of(row: TrialRecord) -> Place:
     )
 
 
-def page(rows: list[TrialRecord], rates: Mapping[Place, Rate]) -> list[str]:
+def page(rows: list[TrialRecord], rates: Mapping[Place, Rate], versions: Sequence[str]) -> list[str]:
     scenarios = sorted({place.scenario for place in rates})
-    found = {(place.noise, place.method, place.max_reobservations) for place in rates if place.noise in NOISES}
+    found = sorted({(p.noise, p.method, p.max_reobservations) for p in rates if p.noise in NOISES})
+    robust, plain = (
+        add(rate for p, rate in rates.items() if p.noise in NOISES and (p.method, p.max_reobservations) == (method, 0))
+        for method in ("contact-robust", "contact")
+    )
     return [
-        HEADING,
+        "# Outliers",
         "",
-        "Written by `python benchmarks/robust.py` from sweeps of `benchmarks/robust.toml`; the counts are in "
-        "`benchmarks/results/robust.csv`. Success: the finished assembly is right. Intervals are Wilson's 95 % "
-        "intervals over the four tasks. Every method has the same seeds. With `--max-reobservations N` "
-        "`contact-robust` observes operations again up to N times, with the same noise, outliers included. "
-        f"{share_of_sweep(len(rows), SWEEP)}",
+        f"Under outliers `contact-robust` succeeds in {format_percent(robust.rate)} of the trials without "
+        f"reobservations, `contact` in {format_percent(plain.rate)}. It also rejects [wrong "
+        "contacts](#wrong-contacts), where other contacts contradict them.",
+        "",
+        "## Outliers in simulation",
         "",
         *table(
             ("noise, 1 mm and 1 degree", "method", "reobservations", "all", *scenarios),
-            [line(*each, scenarios, rates) for each in sorted(found)],
+            [line(*each, scenarios, rates) for each in found],
         ),
         "",
         "Paired differences of `contact-robust` without reobservations and `contact`, with Tango's 95 % intervals. "
@@ -100,6 +103,11 @@ def page(rows: list[TrialRecord], rates: Mapping[Place, Rate]) -> list[str]:
             ("noise", "pairs", "`contact`", "`contact-robust`", "difference"),
             [compare(noise, rows) for noise in (*NOISES, WITHOUT_OUTLIERS)],
         ),
+        "",
+        "Written by `python benchmarks/robust.py` from sweeps of `benchmarks/robust.toml`; the counts are in "
+        "`benchmarks/results/robust.csv`. Success: the finished assembly is right; Wilson's 95 % intervals over the "
+        "four tasks; the same seeds for every method. Reobservations are fresh draws of the same noise, outliers "
+        f"included. {share_of_sweep(len(rows), SWEEP)} Simulated with MuJoCo {' and '.join(versions)}.",
     ]
 
 
@@ -115,7 +123,7 @@ def line(
         f"`{method}`",
         reobservations,
         counted(add(each)),
-        *(f"{r.successes} of {r.trials}" for r in each),
+        *map(fraction, each),
     ]
 
 

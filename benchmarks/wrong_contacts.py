@@ -113,18 +113,20 @@ def section(counts: Counts) -> str:
         FIRST,
         "## Wrong contacts",
         "",
-        "Written by `python -m benchmarks.wrong_contacts`; the counts of every scenario are in "
-        "`benchmarks/results/wrong_contacts.csv`. The numbers are right plans, without physics, at 1 mm and 1 degree "
-        f"(1 sigma per axis), over {len(SCENARIOS)} scenarios. *Ceiling*: `contact-robust` with all contacts but the "
-        "wrong one. Where no other contact fixes a direction, the observed pose stays, and its error is larger than "
-        "the play. *Dropped*: draws in which `contact-robust` dropped a contact, rightly or wrongly.",
-        "",
         "| wrong | draws | ceiling | `contact` | `contact-drop` | `contact-robust` | dropped rightly | wrongly |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for kind, title in KINDS.items():
         sums = [sum(counts[kind, name, column] for name in SCENARIOS) for column in COLUMNS]
         lines.append(f"| {title} | {' | '.join(map(str, sums))} |")
+    lines += [
+        "",
+        "Right plans, without physics, at 1 mm and 1 degree (1 sigma per axis), over "
+        f"{len(SCENARIOS)} scenarios. *Ceiling*: `contact-robust` with all contacts but the wrong one. Where no other "
+        "contact fixes a direction, the observed pose stays, and its error exceeds the play. *Dropped*: draws in which "
+        "`contact-robust` dropped a contact, rightly or wrongly. `python -m benchmarks.wrong_contacts` writes the "
+        "table; the counts of every scenario are in `benchmarks/results/wrong_contacts.csv`.",
+    ]
     return "\n".join([*lines, LAST])
 
 

@@ -1,53 +1,117 @@
-"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (half a minute)."""
+"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (two minutes)."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from apo_bench.assembly import Assembly
+from apo_bench.formats.kit import make_part_mesh
+from apo_bench.geometry import Array, Solid, build_union_mesh, shrink_pieces
+from apo_bench.resources import folder
+from apo_bench.scenario import Scenario
 from apo_bench.scenario.file import list_scenario_names, load_scenario
-from apo_bench.simulation.scene.render import aim_camera, draw_picture
+from apo_bench.simulation.graphics import renderer
+from apo_bench.simulation.scene.render import aim_camera
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import simulate_demonstration
 
 SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
-SIZE = (600, 500)
+SIZE = (1200, 960)  # rendered at this size, and reduced on the sheet
 COLUMNS = 5
 SEED = 0
-AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, if not the usual side
+AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, where not 128
+ELEVATION_DEG = -34.0
+FILLED = 0.86  # share of the picture that the assembly fills, in width or height
+TABLE = (0.76, 0.72, 0.67)
+STEEL = (0.55, 0.57, 0.60)  # of parts without a colour
 
 
 def main() -> None:
     names = list_scenario_names()
-    figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.4), layout="constrained")
+    figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.2), layout="constrained")
     for axis in axes.flat:
         axis.axis("off")
     for axis, name in zip(axes.flat, names, strict=False):
-        axis.imshow(finished(name), interpolation="antialiased")
+        axis.imshow(finished(name), interpolation="antialiased", interpolation_stage="rgba")
         axis.set_title(name, fontsize=13, fontweight="bold", pad=5)
-    figure.savefig(SHEET, dpi=110)
+    figure.savefig(SHEET, dpi=110, pil_kwargs={"optimize": True})
     plt.close(figure)
 
 
 def finished(name: str) -> NDArray[np.uint8]:
-    """Return a picture of the finished assembly, as large as it fits."""
-    scene = build_scene(load_scenario(name))
-    scene.shown.model.vis.headlight.ambient[:] = 0.4
-    simulated = simulate_demonstration(scene, 0.0, SEED)
-    poses = simulated.demonstration.final
-    standing = {**{part: scene.scenario.start[part] for part in scene.shown.fixed if part != "table"}, **poses}
-    at = np.array([pose[:3, 3] for part, pose in standing.items() if part != "table"])
-    middle = (at.min(axis=0) + at.max(axis=0)) / 2
-    extent = float(np.linalg.norm(at.max(axis=0) - at.min(axis=0)))
-    azimuth = AZIMUTH_DEG.get(name, 128.0)
-    return draw_picture(scene, poses, *SIZE, aim_camera(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
+    """Return a picture of the finished assembly, as large as it fits; each part is one mesh, without inner faces."""
+    scenario = load_scenario(name)
+    demonstration = simulate_demonstration(build_scene(scenario), 0.0, SEED).demonstration
+    assembly = scenario.assembly
+    poses = {part: demonstration.final.get(part, scenario.start[part]) for part in assembly.solids}
+    spec = mujoco.MjSpec.from_file(str(folder("assets") / "room.xml"))
+    for part, solid in assembly.solids.items():
+        add_part(spec, part, solid, scenario, poses[part])
+    model = spec.compile()
+    model.vis.headlight.ambient[:] = 0.4
+    model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
+    used = sorted(assembled(demonstration.assembly))
+    corners = np.concatenate([corners_of(assembly.solids[part], poses[part]) for part in used])
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with renderer(model, *SIZE) as draws:
+        draws.update_scene(data, camera=fit_camera(corners, AZIMUTH_DEG.get(name, 128.0), model))
+        return np.array(draws.render())
+
+
+def assembled(assembly: Assembly) -> set[str]:
+    """Parts that touch another one than the table in the end; all but the table if none does."""
+    last = {part: operation for operation in assembly.operations for part in (operation.main, *operation.carries)}
+    touching: set[str] = set()
+    for operation in last.values():
+        pairs = [{contact.manipulated.part, contact.environment.part} for contact in operation.contacts]
+        touching.update(*(pair for pair in pairs if "table" not in pair))
+        touching.update((operation.main, *operation.carries) if operation.carries else ())
+    return touching or set(assembly.solids) - {"table"}
+
+
+def add_part(spec: Any, part: str, solid: Solid, scenario: Scenario, T: Array) -> None:
+    """Add a part as a mesh without smoothed edges."""
+    if part == "table":  # its pieces have faces in one plane
+        shape = make_part_mesh(solid, scenario.clearance_mm).apply_scale(1e-3)
+    else:
+        shape = build_union_mesh(shrink_pieces(solid, 1e-3 * scenario.clearance_mm))
+    mesh = spec.add_mesh(name=part, uservert=shape.triangles.ravel(), userface=np.arange(3 * len(shape.triangles)))
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    color = scenario.colors.get(part, TABLE if part == "table" else STEEL)
+    body = spec.worldbody.add_body(pos=T[:3, 3], quat=Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True))
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=part, rgba=(*color, 1.0))
+
+
+def corners_of(solid: Solid, T: Array) -> Array:
+    """Corners of the pieces of a part, (n, 3), world, [m]."""
+    own = np.concatenate([piece.corners for piece in solid.pieces])
+    return np.asarray(own @ T[:3, :3].T + T[:3, 3])
+
+
+def fit_camera(corners: Array, azimuth_deg: float, model: Any) -> Any:
+    """Aim a camera so that points fill the picture."""
+    az, el = np.radians((azimuth_deg, ELEVATION_DEG))
+    ahead = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+    right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.cos(el)
+    axes = np.stack([right, np.cross(right, ahead), ahead])
+    seen = corners @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    half = np.tan(np.radians(model.vis.global_.fovy / 2)) * np.array([SIZE[0] / SIZE[1], 1.0])
+    off = seen - middle
+    distance = (np.abs(off[:, :2]) / (FILLED * half)).max(axis=1) - off[:, 2]
+    return aim_camera(middle @ axes, float(distance.max()), azimuth_deg, ELEVATION_DEG)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Draw the picture at the top, pose estimates and two pictures of films: `python docs/pictures.py` (half a minute)."""
+"""Draw pose estimates and two pictures of films: `python docs/pictures.py` (half a minute)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as imageio
-from top_picture import ARM, FITS, JAMS, draw_top, shot
 
-from apo_bench.assembly import Plan
 from apo_bench.correction.correctors import correct
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.scenario.file import load_scenario
@@ -27,18 +25,12 @@ NOISE_LEVEL = 2.0
 def main() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
     shown = simulate_demonstration(scene, 1.0, SEED)
-    seen = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
-    corrected = correct(seen, "contact").poses
-    with_ur5e = build_scene(scene.scenario, arm=ARM)
-    shots = [
-        shot(with_ur5e, Plan(seen.assembly, seen.start, goals), shown.layout.poses, *told)
-        for goals, told in (
-            (seen.poses, ("Observed poses: it jams", "the end of the stick\nmeets the faces", JAMS)),
-            (corrected, ("Corrected by contacts: it fits", "0.25 mm clearance\non each side", FITS)),
-        )
+    observed = observe_demonstration(shown, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
+    corrected = correct(observed, "contact").poses
+    panels = [
+        poses_panel("observed", observed, observed.poses, 3),
+        poses_panel("corrected by contacts", observed, corrected, 3),
     ]
-    draw_top(shots, HERE / "top.png")
-    panels = [poses_panel("observed", seen, seen.poses, 3), poses_panel("corrected by contacts", seen, corrected, 3)]
     draw_poses(scene.scenario, 3, panels, HERE / "estimates.png")
     for method in ("uncorrected", "contact"):
         draw_film(method, HERE / f"film_{method}.png")

@@ -1,205 +1,173 @@
-"""The picture at the top: a UR5e with observed poses and with corrected ones, each with the hole along the stick.
+"""Draw the animated picture at the top, a jam and a fit: `python docs/top_picture.py` (three minutes).
 
-Both are states of a replay. The inset hides the arm and the stick; the yellow line is the outline of the stick at the
-hole entrance, and red is where its end meets a face of a castle.
+The arm is the UR5e with the 2F-85 gripper of MuJoCo Menagerie, which the repository does not hold: name its folder in
+APO_BENCH_MENAGERIE. The robot is simulated with it as with any other arm; its meshes are only drawn.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
-from matplotlib.patches import ConnectionPatch, Polygon, Rectangle
-from numpy.typing import NDArray
-from shapely.geometry import MultiPoint
-from shapely.ops import unary_union
+from PIL import Image, ImageDraw, ImageFont
 
 from apo_bench.assembly import Plan
+from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.render import aim_camera, picture_with_arm
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.stages import replay_and_judge
+from apo_bench.perception.observation.noise import NoiseLevel, make_noise
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.graphics import renderer
+from apo_bench.simulation.physics import Physics
+from apo_bench.simulation.scene.composing import room_with_parts
+from apo_bench.simulation.scene.render import aim_camera
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
 
-ARM = "ur5e_primitive"
-GRIPPER = "arm/gripper/base"
-SIZE = (1560, 1120)
-CLOSE = (760, 760)
-"""Width and height of the whole and of the inset [px]."""
-WIDE_DEG = 38.0
-NARROW_DEG = 9.0
-"""Vertical angle of view of the two."""
-HALF_M = 0.03
-"""Of a castle, along the hole."""
-HOLE_M = 0.04
-NEAR_M = 0.01
-HELD_M = 0.3
-"""Height of the hole above the table, how near the stick is to its axis while it goes in, and to the gripper."""
-INSET = (0.645, 0.475, 0.35, 0.515)
-"""In the whole: left, bottom, width, height, as shares."""
-BOX = 68
-"""Half of the frame about the tower [px]."""
-JAMS = "#d7263d"
-FITS = "#2a9d4a"
-
-
-class View(NamedTuple):
-    """A camera that looks at a point from a distance."""
-
-    at: Array
-    distance_m: float
-    azimuth_deg: float
-    elevation_deg: float
-    fovy_deg: float
-    size: tuple[int, int]
-
-    def pixels(self, points: Array) -> Array:
-        """Where points of the world, (n, 3), are in the picture, (n, 2), from its upper left corner."""
-        az, el = np.radians((self.azimuth_deg, self.elevation_deg))
-        ahead = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
-        right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.cos(el)
-        off = points - (self.at - self.distance_m * ahead)
-        scale = self.size[1] / 2 / np.tan(np.radians(self.fovy_deg / 2)) / (off @ ahead)
-        x = off @ right * scale
-        y = off @ np.cross(right, ahead) * scale
-        return np.stack([self.size[0] / 2 + x, self.size[1] / 2 - y], axis=1)
+PICTURE = Path(__file__).parent / "pictures" / "top.gif"
+ARM = "menagerie:universal_robots_ur5e"
+SEED = 7
+NOISE_LEVEL = 1.0  # mm and degrees, 1 sigma per axis
+PANEL = (440, 400)  # width and height of one half [px]
+INSET = (150, 150)  # of the whole arm, in the upper right corner of a half [px]
+BAR = 40  # height of the title [px]
+OVERSAMPLING = 2  # rendered larger by this factor and reduced
+COLOURS = 128  # of the palette; fewer make a smaller file
+STEP_S = 0.08  # simulated time between two frames
+FRAME_MS = 80  # time that a frame is shown
+HOLD_MS = 2500  # time that the last frame is shown
+JAMS_S = 1.5  # from the first frame: when the robot has stopped, and
+FITS_S = 2.4  # when the stick is in
+SIDE_M = 0.02  # how near to the line through the hole, and
+ABOVE_M = 0.12  # how low above castle 1 the stick is when the insertion begins
+BEFORE_S = 0.4  # shown before it begins
+AFTER_S = 3.2  # shown after it
+RED = (196, 30, 50)
+GREEN = (30, 130, 65)
 
 
-class Shot(NamedTuple):
+class Half(NamedTuple):
     """One half of the picture."""
 
     title: str
-    said: str
-    color: str
-    whole: NDArray[np.uint8]
-    tower: Array
-    """The middle of the hole in the whole, (2,) [px]."""
-    close: NDArray[np.uint8]
-    end: Array
-    """The end of the stick in the inset, (n, 2) [px]."""
-    meets: Sequence[Array]
-    """Where it meets a castle, polygons (n, 2) [px]."""
+    ending: str
+    color: tuple[int, int, int]
+    ends_s: float
+    """When the ending appears, from the first frame [s]."""
+    frames: Sequence[Image.Image]
 
 
-def shot(scene: Scene, plan: Plan, reference: Array, title: str, said: str, color: str) -> Shot:
-    """The state of a replay at which the stick is as far in as it comes."""
-    model = scene.work.model
-    data = mujoco.MjData(scene.work.model)
-    data.qpos[:] = state = deepest(scene, plan, reference)
-    mujoco.mj_forward(model, data)
-    along = reference[0][:3, 0]
-    turn = float(np.degrees(np.arctan2(along[1], along[0])))
-    hole = reference[0][:3, 3] + [0.0, 0.0, HOLE_M]
-    middle = hole + np.array([-0.165, -0.03, 0.215])
-    wide = View(middle, 1.3, turn + 62.0, -15.0, WIDE_DEG, SIZE)
-    narrow = View(hole, 0.35, turn, 0.0, NARROW_DEG, CLOSE)
-    end = narrow.pixels(at_mouth(face(model, data, "stick/bar", along), data.body("stick/").xmat[::3], hole, along))
-    shape = MultiPoint(end).convex_hull
-    bodies = [model.geom(g).name for g in range(model.ngeom)]
-    near = [narrow.pixels(face(model, data, name, -along)) for name in bodies if name.startswith("castle")]
-    meets = shape.intersection(unary_union([MultiPoint(corners).convex_hull for corners in near]))
-    parts = [part for part in getattr(meets, "geoms", [meets]) if part.area > 0]
-    return Shot(
-        title,
-        said,
-        color,
-        photo(scene, state, wide),
-        wide.pixels(hole[np.newaxis])[0],
-        photo(scene, state, narrow, hidden=("arm/", "stick/")),
-        np.array(shape.exterior.coords),
-        [np.array(part.exterior.coords) for part in parts],
+def main() -> None:
+    scene = build_scene(load_scenario("stick_in_tower"), arm=ARM)
+    demonstration = simulate_demonstration(scene, 0.0, SEED)
+    observed = observe_demonstration(demonstration, make_noise("isotropic", NoiseLevel(NOISE_LEVEL, NOISE_LEVEL)), SEED)
+    corrected = correct(observed, "contact").poses
+    reference = demonstration.layout.poses
+    plan = partial(Plan, observed.assembly, observed.start)
+    model = model_with_meshes(scene)
+    jam = list(draw_states(scene, model, insertion(scene, plan(observed.poses), reference), reference[0]))
+    fit = list(draw_states(scene, model, insertion(scene, plan(corrected), reference), reference[0]))
+    halves = (
+        Half("Poses as observed", "jams: stopped by contact force", RED, JAMS_S, jam),
+        Half("Poses corrected by contacts", "fits: 0.25 mm clearance per side", GREEN, FITS_S, fit),
     )
+    frames = list(join_halves(halves))
+    save_gif(frames, PICTURE)
+    print(f"Wrote {PICTURE} ({len(frames)} frames, {PICTURE.stat().st_size / 1e6:.2f} MB)")
 
 
-def deepest(scene: Scene, plan: Plan, reference: Array) -> Array:
-    """The state of the replay at which the stick, still in the gripper, is as far in as it comes."""
-    model = scene.work.model
-    stick = model.body("stick/").id
-    gripper = model.body(GRIPPER).id
-    along = reference[0][:3, 0]
-    across = reference[0][:3, 1]
-    hole = reference[0][:3, 3] + [0.0, 0.0, HOLE_M]
-    best: list[tuple[float, Array]] = []
-
-    def watch(data: Any) -> None:
-        held = np.linalg.norm(data.xpos[stick] - data.xpos[gripper]) < HELD_M
-        off = data.xpos[stick] - hole
-        before_it = max(abs(off[2]), abs(across @ off)) < NEAR_M
-        depth = float(along @ off)
-        if held and before_it and (not best or depth > best[-1][0]):
-            best.append((depth, np.array(data.qpos)))
-
-    replay_and_judge(plan, scene, reference, watch)
-    return best[-1][1]
+def model_with_meshes(scene: Scene) -> Any:
+    """Return the scene as a model with all meshes of the arm, for drawing only."""
+    folder = Path(os.environ["APO_BENCH_MENAGERIE"])
+    spec = room_with_parts(scene.scenario, scene.scenario.clearance_mm, Physics())
+    arm = mujoco.MjSpec.from_file(str(folder / "universal_robots_ur5e" / "ur5e.xml"))
+    hand = mujoco.MjSpec.from_file(str(folder / "robotiq_2f85" / "2f85.xml"))
+    arm.attach(hand, site=arm.site("attachment_site"), prefix="gripper/")
+    for light in list(arm.lights):
+        arm.delete(light)
+    stand = spec.worldbody.add_body(name="arm/", pos=scene.arm.base, quat=scene.arm.turn)
+    spec.attach(arm, frame=stand.add_frame(), prefix="arm/")
+    model = spec.compile()
+    model.vis.global_.offwidth, model.vis.global_.offheight = (OVERSAMPLING * size for size in PANEL)
+    model.vis.headlight.ambient[:] = 0.38
+    return model
 
 
-def face(model: Any, data: Any, geom: str, towards: Array) -> Array:
-    """The four corners of a box that are farthest in a direction, (4, 3)."""
-    number = model.geom(geom).id
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    corners = data.geom_xpos[number] + signs * model.geom_size[number] @ data.geom_xmat[number].reshape(3, 3).T
-    return corners[np.argsort(corners @ towards)[-4:]]
+def insertion(scene: Scene, plan: Plan, reference: Array) -> list[Array]:
+    """Replay a plan; return the states around the moment in which the stick, held in front of the hole, goes down."""
+    moments: list[tuple[float, Array]] = []
+    replay_and_judge(plan, scene, reference, lambda data: moments.append((data.time, np.array(data.qpos))))
+    times = np.array([time for time, _ in moments])
+    stick = scene.work.model.joint("stick/").qposadr[0]
+    off = np.array([state[stick : stick + 3] for _, state in moments]) - reference[0][:3, 3]
+    begin = times[np.argmax((np.abs(off @ reference[0][:3, 1]) < SIDE_M) & (off[:, 2] < ABOVE_M))]
+    wanted = np.searchsorted(times, np.arange(begin - BEFORE_S, begin + AFTER_S, STEP_S))
+    return [moments[min(int(k), len(moments) - 1)][1] for k in wanted]
 
 
-def at_mouth(corners: Array, axis: Array, hole: Array, along: Array) -> Array:
-    """Corners of the end of the stick, moved along it to the plane in which the hole begins, (4, 3)."""
-    left = (hole - HALF_M * along - corners) @ along / (axis @ along)
-    return corners + left[:, None] * axis
+def draw_states(scene: Scene, model: Any, states: Sequence[Array], goal: Array) -> Iterator[Image.Image]:
+    """Draw states of a replay: the hole close up, and the whole arm in a corner."""
+    turn = float(np.degrees(np.arctan2(goal[1, 0], goal[0, 0])))
+    close = aim_camera(goal[:3, 3] - 0.045 * goal[:3, 0] + [0.0, 0.0, 0.06], 0.37, turn + 47.0, -20.0)
+    whole = aim_camera(np.array([-0.18, 0.0, 0.3]), 1.3, turn + 70.0, -14.0)
+    data = mujoco.MjData(model)
+    own = scene.work.model
+    with renderer(model, *(OVERSAMPLING * size for size in PANEL)) as draws:
+        for state in states:
+            for k in range(own.njnt):
+                joint = own.joint(k)
+                data.joint(joint.name).qpos = state[joint.qposadr[0] :][: len(data.joint(joint.name).qpos)]
+            mujoco.mj_forward(model, data)
+            picture, inset = (shoot(draws, data, camera) for camera in (close, whole))
+            picture = picture.resize(PANEL, Image.Resampling.LANCZOS)
+            left = (inset.width - inset.height) // 2
+            inset = inset.crop((left, 0, left + inset.height, inset.height)).resize(INSET, Image.Resampling.LANCZOS)
+            corner = PANEL[0] - INSET[0] - 8, 8
+            picture.paste(inset, corner)
+            box = (corner[0] - 2, corner[1] - 2, corner[0] + INSET[0] + 1, corner[1] + INSET[1] + 1)
+            ImageDraw.Draw(picture).rectangle(box, outline="white", width=2)
+            yield picture
 
 
-def photo(scene: Scene, state: Array, view: View, hidden: tuple[str, ...] = ()) -> NDArray[np.uint8]:
-    """The scene in a state, without bodies whose names begin so."""
-    model = scene.work.model
-    kept = model.geom_rgba.copy(), float(model.vis.global_.fovy), model.vis.headlight.ambient.copy()
-    for geom in range(model.ngeom):
-        if hidden and model.body(model.geom_bodyid[geom]).name.startswith(hidden):
-            model.geom_rgba[geom, 3] = 0.0
-    model.vis.global_.fovy = view.fovy_deg
-    model.vis.headlight.ambient[:] = 0.45 if hidden else 0.25
-    model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
-    camera = aim_camera(view.at, view.distance_m, view.azimuth_deg, view.elevation_deg)
-    image = picture_with_arm(scene, scene.scenario.start, state, *view.size, camera)
-    model.geom_rgba[:], model.vis.global_.fovy, model.vis.headlight.ambient[:] = kept
-    return image
+def shoot(draws: Any, data: Any, camera: Any) -> Image.Image:
+    """Draw a state through a camera."""
+    draws.update_scene(data, camera=camera)
+    return Image.fromarray(np.array(draws.render()))
 
 
-def draw_top(shots: Sequence[Shot], path: Path) -> None:
-    """Both halves beside each other."""
-    figure, axes = plt.subplots(1, 2, figsize=(13.0, 5.3), layout="constrained")
-    for axis, half in zip(axes, shots, strict=True):
-        axis.imshow(half.whole, interpolation="antialiased")
-        axis.set_title(half.title, fontsize=23, fontweight="bold", pad=10)
-        axis.axis("off")
-        inset = axis.inset_axes(INSET)
-        draw_close(inset, half)
-        box = Rectangle(half.tower - BOX, 2 * BOX, 2 * BOX, fill=False, edgecolor=half.color, linewidth=2.2)
-        axis.add_patch(box)
-        for corner, x in ((0.0, -BOX), (1.0, BOX)):
-            ends = {"xyA": (corner, 0.0), "coordsA": inset.transAxes, "xyB": half.tower + np.array([x, -BOX])}
-            line = ConnectionPatch(**ends, coordsB=axis.transData, color=half.color, linewidth=1.4)
-            axis.add_artist(line)
-    figure.savefig(path, dpi=120, bbox_inches="tight", pad_inches=0.08)
-    plt.close(figure)
+def join_halves(halves: Sequence[Half]) -> Iterator[Image.Image]:
+    """Put the halves next to each other, each with its title, and from some frame on its ending."""
+    for k in range(len(halves[0].frames)):
+        frame = Image.new("RGB", (2 * PANEL[0] + 8, PANEL[1] + BAR), "white")
+        draw = ImageDraw.Draw(frame)
+        for x, half in zip((0, PANEL[0] + 8), halves, strict=True):
+            frame.paste(half.frames[k], (x, BAR))
+            middle = x + PANEL[0] / 2
+            draw.text((middle, BAR / 2), half.title, half.color, font(21), "mm")
+            if k * STEP_S > half.ends_s:
+                draw.rectangle((x, BAR + PANEL[1] - 40, x + PANEL[0], BAR + PANEL[1]), half.color)
+                draw.text((middle, BAR + PANEL[1] - 20), half.ending, "white", font(21), "mm")
+        yield frame
 
 
-def draw_close(axis: Any, half: Shot) -> None:
-    """The faces of the hole, the end of the stick, and where they meet."""
-    axis.imshow(half.close, interpolation="antialiased")
-    axis.add_patch(Polygon(half.end, closed=True, facecolor="#e8c954", alpha=0.45, edgecolor="none"))
-    for corners in half.meets:
-        axis.add_patch(Polygon(corners, closed=True, facecolor=JAMS, edgecolor="none", alpha=0.95))
-    axis.add_patch(Polygon(half.end, closed=True, fill=False, edgecolor="#ffe46b", linewidth=3.0))
-    white = {"color": "white", "fontsize": 13.0, "fontweight": "bold"}
-    axis.text(0.5, 0.965, "seen along the stick", va="top", ha="center", transform=axis.transAxes, **white)
-    axis.text(0.5, 0.045, half.said, va="bottom", ha="center", transform=axis.transAxes, **white)
-    axis.set_xticks([])
-    axis.set_yticks([])
-    for spine in axis.spines.values():
-        spine.set(color=half.color, linewidth=3.0)
+def font(size: int) -> Any:
+    """Return matplotlib's bold font."""
+    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans-Bold.ttf", size)
+
+
+def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
+    """Write frames with one palette, and without dithering, which would make every pixel change."""
+    sample = np.concatenate([np.array(frame) for frame in frames[:: len(frames) // 3]])
+    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    times = [FRAME_MS] * (len(frames) - 1) + [HOLD_MS]
+    indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=times, loop=0, optimize=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -11,17 +11,7 @@ from apo_bench.scenario.parts import load_part
 from tests.audited_rounds import DOWN
 from tests.audited_states import Seen
 from tests.end_states import END, moved, shift
-from tests.rounds import (
-    countersink,
-    dovetail,
-    in_groove,
-    nested,
-    peg,
-    peg_in_plate,
-    plate,
-    through,
-    wedges_meet,
-)
+from tests.rounds import countersink, dovetail, in_groove, nested, peg, peg_in_plate, plate, through, wedges_meet
 from tests.scenes import Scene, block, mm, scene, table, touch
 
 
@@ -80,15 +70,6 @@ def at_fence() -> Scene:
         Operation("A", touch("A", "table", "nz-top") + touch("A", "fence", "px-nx")),
     ]
     return fixed(scene([table(), block("fence"), block("A")], operations, [mm(50, 0, 25), mm(0, 0, 25)]), "fence")
-
-
-def shaft_on_block() -> Scene:
-    """A shaft lies on a block."""
-    operations = [
-        Operation("A", touch("A", "table", "nz-top")),
-        Operation("peg", touch("peg", "A", "wall-pz")),
-    ]
-    return scene([table(), block("A"), peg()], operations, [mm(0, 0, 25), mm(-25, 0, 55, (0, 90, 0))])
 
 
 PEGS = [
@@ -155,6 +136,6 @@ STATES = [*PEGS, *SHAFTS, *CONES, *TILTED]
 DIFFERS = {
     "peg in a fixed hole, pushed by 1.5 mm from one side of its play to the other": (
         "a mate of a fixed part says where a part belongs, so all motion in it counts, that within its play too"
-    ),
+    )
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""

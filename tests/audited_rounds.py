@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.geometry import pose
 from tests.audited_states import HALF_Y, Seen
 from tests.end_states import moved, put, shift
 from tests.rounds import (
@@ -78,8 +77,6 @@ CONES = [
 SLOPE = np.radians(30.0)
 DOWN = np.array([0.0, -np.cos(SLOPE), -np.sin(SLOPE)])
 OUT = np.array([0.0, -np.sin(SLOPE), np.cos(SLOPE)])
-MIDDLE = mm(0, 0, 10 + 30 * np.tan(SLOPE))
-ABOUT = MIDDLE @ pose.exp([0, 0, 0, *np.radians(3.0) * OUT]) @ pose.inverse(MIDDLE)
 TOP = 20.0 + 60.0 * np.tan(SLOPE)
 
 TILTED = [

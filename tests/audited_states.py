@@ -97,29 +97,15 @@ def aligned_twice() -> scenes.Scene:
     return blocks("ABD", operations, (50, 0, 25), (0, 0, 25), (50, 120, 25), (0, 120, 25), (150, 120, 25))
 
 
-def stop_for_two() -> scenes.Scene:
-    """B aligns A, is put aside, and D is laid against it there for a while: D leaves, not B."""
-    operations = [
-        on_table("B"),
-        on_table("A", beside("A", "B", "px-nx")),
-        on_table("B"),
-        on_table("D", beside("D", "B", "nx-px")),
-        on_table("D"),
-    ]
-    return blocks("ABD", operations, (50, 0, 25), (0, 0, 25), (150, 0, 25), (200, 0, 25), (300, 0, 25))
-
-
 def at_edge(share: float) -> np.ndarray:
     """Puts what stands in the middle of the assembly at the table's edge, so much of 60 mm on it."""
     return mm(700 + 30 - 60 * share, 0, 0)
 
 
-HALF_X = (180, 0, 0)
 HALF_Y = (0, 180, 0)
 HALF_Z = (0, 0, 180)
 QUARTER_X = (90, 0, 0)
 QUARTER_Z = (0, 0, 90)
-GROUP = ("cube2", "cube3", "stick")
 IN_A = mm(-60, 150, 19)
 IN_B = mm(60, 150, 19)
 
@@ -218,10 +204,7 @@ FIXTURES = [
     Seen("fixture, castle 2 pushed by 2 mm when the cube was taken", FIXTURE, [shift("castle2", 4, 0, 2, 0)], False),
     Seen("kept block: B ends 10 mm off C", kept, [shift("B", 4, 10, 0, 0)], False),
     Seen(
-        "block used later: B pushed by 3 mm under D",
-        used_later,
-        [shift("B", 4, 3, 0, 0), shift("D", 4, 3, 0, 0)],
-        True,
+        "block used later: B pushed by 3 mm under D", used_later, [shift("B", 4, 3, 0, 0), shift("D", 4, 3, 0, 0)], True
     ),
     Seen("block aligned twice: A pushed by 5 mm when D goes", aligned_twice, [shift("A", 5, -5, 0, 0)], True),
 ]

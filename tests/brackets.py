@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, make_cylinder_hull, pose
-from tests import rounds
+from tests import round_parts
 from tests.scenes import Scene, box_faces, mm, scene, table, touch
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -23,7 +23,7 @@ def pins() -> Solid:
         walls[f"{name}_pin"] = RoundFace(f"{name}_pin", at, Z, (0.01, 0.039), (0.004, 0.004), False)
         walls[f"{name}_tip"] = RoundFace(f"{name}_tip", at, Z, (0.039, 0.04), (0.004, 0.003), False)
         found.append(make_cylinder_hull(f"{name}_pin", Cylinder(at + 0.0245 * Z, Z, 0.004, 0.0145)))
-        tip = np.concatenate([rounds.ring(4, 39), rounds.ring(3, 40)])
+        tip = np.concatenate([round_parts.ring(4, 39), round_parts.ring(3, 40)])
         found.append(Hull(f"{name}_tip", at + tip))
     flat = {face.name: face for face in box_faces((50, 20, 10))}
     faces = {"top": replace(flat["pz"], name="top"), "bottom": _lifted(flat["nz"])}
@@ -41,7 +41,7 @@ def bracket() -> Solid:
     for name, x in (("a", -0.03), ("b", 0.03)):
         at = np.array([x, 0.0, 0.0])
         walls[name] = RoundFace(name, at, Z, (0.0, 0.01), (0.004, 0.004), True, fit=True)
-        pieces += [Hull(f"{name}{w.name}", w.corners + at) for w in rounds.bored(4, 20, 10, wide=True)]
+        pieces += [Hull(f"{name}{w.name}", w.corners + at) for w in round_parts.bored(4, 20, 10, wide=True)]
     pieces.append(Box("middle", np.array([0.0, 0.0, 0.005]), np.array([0.01, 0.02, 0.005])))
     bottom = _lifted({face.name: face for face in box_faces((50, 20, 10))}["nz"])
     return Solid("bracket", {"bottom": bottom}, tuple(pieces), 0.02 * Z, 1e-4, walls)
@@ -55,11 +55,13 @@ def on_pins() -> Scene:
 
 def under_roof(angle_deg: float = 30.0) -> Scene:
     """A wedge on the table with its slope under a roof that is tilted as it is."""
-    slope = rounds.wedge("roof", angle_deg)
+    slope = round_parts.wedge("roof", angle_deg)
     turned = pose.exp([0, 0, 0, np.pi, 0, 0]) @ np.eye(4)
     rise = 1e-3 * (20 + 60 * np.tan(np.radians(angle_deg)))
     turned[:3, 3] = [0.0, 0.0, rise]
     contacts = touch("wedge", "table", "bottom-top") + touch("wedge", "roof", "slope-slope")
-    made = scene([table(), slope, rounds.wedge(angle_deg=angle_deg)], [Operation("wedge", contacts)], [mm(0, 0, 0)])
+    made = scene(
+        [table(), slope, round_parts.wedge(angle_deg=angle_deg)], [Operation("wedge", contacts)], [mm(0, 0, 0)]
+    )
     of = replace(made.assembly, fixed=frozenset({"table", "roof"}))
     return Scene(of, {**made.start, "roof": turned}, made.goals)

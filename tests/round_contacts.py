@@ -104,11 +104,7 @@ LYING = tilted((-60.0, 10.0, 5.0), (0.0, 90.0, 20.0))
 CONTACTS: Mapping[str, tuple[Contact, np.ndarray, int]] = {
     "shaft in hole": (touching("pin.shaft", "plate.bore"), IN_BORE, 4),
     "shaft on plane": (touching("pin.shaft", "table.top"), LYING, 2),
-    "cone in cone": (
-        touching("pin.taper", "plate.sink"),
-        PLATE_AT @ tilted((0.0, 0.0, -12.0), (0.0, 0.0, 70.0)),
-        5,
-    ),
+    "cone in cone": (touching("pin.taper", "plate.sink"), PLATE_AT @ tilted((0.0, 0.0, -12.0), (0.0, 0.0, 70.0)), 5),
     "cone on rim": (touching("pin.taper", "plate.rim"), PLATE_AT @ tilted((0.0, 0.0, -10.0), (0.0, 0.0, 70.0)), 3),
 }
 """Kind -> the contact, where the pin then is, how many directions it fixes (by hand)."""

@@ -16,8 +16,8 @@ import trimesh
 import apo_bench
 from apo_bench.assembly import Outcome, ReachedState, Snapshot
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.formats.observation import as_planned
 from apo_bench.resources import folder
+from apo_bench.simulation.execution.config import ExecutionConfig
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"
@@ -96,6 +96,9 @@ def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) ->
         "height": 24,
         "most_s": 0.0,
         "out": made / "rows",
+        "replay.config": ExecutionConfig("near-contact"),
+        "check_scenario.seeds": 0,
+        "check_scenario.fidelity": "near-contact",
         "import_part.file": made / "blocks.stl",
         "import_part.folder": made / "parts",
         "import_part.unit": "mm",
@@ -156,48 +159,3 @@ def test_an_environment_answers_a_wrong_argument_in_one_sentence(name: str) -> N
     wrong += [each for key in ("seed", "options") for each in complaints(env.reset, {}, key)]
     wrong += complaints(env.step, {}, "action")
     assert not wrong, "\n".join(wrong)
-
-
-def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
-    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    n = len(observation.poses)
-    assert dataclasses.replace(observation, observed=[1] * n).observed.all()
-    for seen in ([2] * n, [np.nan] * n, ["yes"] * n):
-        with pytest.raises(apo_bench.InputError, match="observed of Observation must be an array of True"):
-            dataclasses.replace(observation, observed=seen)
-    start = {**observation.start, "stik": np.eye(4)}
-    shown = {"human_error_covariance": observation.covariance, "final": {}}
-    parts = {"assembly": observation.assembly, "poses": observation.poses}
-    plan = {"assembly": observation.assembly, "target_poses": observation.poses}
-    for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, plan)):
-        with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'; did you mean 'stick'"):
-            record(**{**more, "start": start})
-    for key in ("start", "final"):
-        with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'"):
-            apo_bench.Demonstration(**{**parts, **shown, "start": observation.start, key: start})
-
-
-def test_a_noise_model_that_makes_a_wrong_record_is_named(castles: apo_bench.Scene) -> None:
-    def mine(assembly: Any, shown: Any, rng: Any) -> Any:
-        return apo_bench.Observation(assembly, shown.start, shown.poses, None, [True] * len(assembly))  # type: ignore[arg-type]
-
-    shown = simulate_demonstration(castles, 0.0, 0).demonstration
-    with pytest.raises(
-        apo_bench.InputError, match=r"^the noise model 'mine' failed: covariance of Observation must be"
-    ):
-        apo_bench.observe(shown, mine, np.random.default_rng(0))
-
-
-def test_a_relation_that_is_left_out_may_be_one_text() -> None:
-    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
-    one, several, all_of_them = (apo_bench.explain(observation, observation.poses, x) for x in ("R1", ("R1",), ()))
-    assert one.redundant == several.redundant < all_of_them.redundant
-    assert (observation.assembly.without("R1") == observation.assembly.without(("R1",))).all()
-
-
-def test_settings_of_a_trial_are_texts_and_plain_numbers() -> None:
-    for wrong in ({"scenario": 3}, {"scenario": "dovetail", "noise": [1]}, {"scenario": "dovetail", "arm": [1]}):
-        with pytest.raises(apo_bench.InputError, match=r"a name is needed, a str"):
-            apo_bench.TrialConfig(**wrong)
-    assert type(apo_bench.TrialConfig("dovetail", noise_mm=np.float32(0.5)).noise_mm) is float
-    assert apo_bench.SweepConfig("dovetail", trials=np.int64(2)).trials == 2

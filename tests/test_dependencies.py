@@ -9,7 +9,6 @@ import tomllib
 from collections.abc import Iterable
 from importlib.metadata import Distribution, distribution
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from packaging.requirements import Requirement
@@ -91,21 +90,6 @@ def test_what_comes_along_is_little() -> None:
     assert not {"pyarrow", "imageio-ffmpeg", "h5py"} & came.keys(), "these are of extras"
     assert len(came) + 1 < most, sorted(came)
     assert megabytes(came.values()) < most_mb, {name: megabytes([each]) for name, each in came.items()}
-
-
-def test_packages_that_are_needed_by_others_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    needs = {"a": ["b_b[x]>=1", "old; python_version < '3'"], "b_b": ["c; extra == 'x'", "d; extra == 'y'"], "c": ["a"]}
-    monkeypatch.setattr(
-        f"{__name__}.distribution", lambda name: SimpleNamespace(requires=needs.get(name.replace("-", "_")))
-    )
-    assert installed(["a"]).keys() == {"a", "b-b", "c"}
-    assert installed(["a", "b-b[y]"]).keys() == {"a", "b-b", "c", "d"}
-
-
-def test_megabytes_are_those_of_all_files(tmp_path: Path) -> None:
-    (tmp_path / "one").write_bytes(bytes(3_000_000))
-    package = SimpleNamespace(files=["one", "gone"], locate_file=tmp_path.joinpath)
-    assert megabytes([package, package]) == 6.0  # type: ignore[list-item]
 
 
 def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) -> None:

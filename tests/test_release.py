@@ -11,7 +11,7 @@ import pytest
 
 import apo_bench
 from benchmarks.lowest import OLDEST
-from benchmarks.provenance import versions_of, with_mujoco
+from benchmarks.provenance import with_mujoco
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -71,21 +71,10 @@ def test_the_range_of_python_is_the_same_everywhere() -> None:
     assert ".".join(map(str, OLDEST)) == SUPPORTED[0]
 
 
-def test_another_range_would_be_noticed() -> None:
-    assert ranges("Python 3.11 to 3.14, or Python 3.10 to 3.13") == {("3.11", "3.14"), ("3.10", "3.13")}
-
-
 @pytest.mark.parametrize("name", ["ci", "release"])
 def test_workflows_try_every_python(name: str) -> None:
     matrices = re.findall(r"^ +python: \[(.*)\]$", WORKFLOWS[name], re.MULTILINE)
     assert matrices == [", ".join(f'"{each}"' for each in SUPPORTED)]
-
-
-def test_whatever_is_built_is_built_with_a_python_that_is_supported() -> None:
-    named = {each for said in WORKFLOWS.values() for each in re.findall(r'python-version: "(3\.\d+)"', said)}
-    image = re.search(r"^FROM \S+/python:(3\.\d+)-slim$", text("Containerfile"), re.MULTILINE)
-    assert image is not None
-    assert named | {image[1]} <= {*SUPPORTED}
 
 
 @pytest.mark.parametrize(
@@ -105,9 +94,7 @@ def test_results_say_which_mujoco_they_were_simulated_with() -> None:
     ]
     assert {*silent} == without_physics
     said = with_mujoco("# A page\n\nText.\n", ["3.17.0", "4.0.0"])
-    assert said == "# A page\n\n*Simulated with MuJoCo 3.17.0 and 4.0.0.*\n\nText.\n"
-    assert versions_of(said) == ["3.17.0", "4.0.0"]
-    assert versions_of("# A page\n") == []
+    assert said == "# A page\n\nText.\n\n*Simulated with MuJoCo 3.17.0 and 4.0.0.*\n"
 
 
 def test_mujoco_4_waits_where_dm_control_comes_along() -> None:

@@ -1,4 +1,4 @@
-"""The command `apo-bench part import`: a CAD file becomes part files."""
+"""The commands `apo-bench part`: a CAD file becomes part files, and a scenario becomes parts to print."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,6 +9,7 @@ import typer
 from apo_bench.cli.shared import (
     AsJson,
     Command,
+    ScenarioArgument,
     make_group,
     make_path_argument,
     make_path_option,
@@ -21,11 +22,11 @@ from apo_bench.io import read_text
 from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES
 
 _HELP = """
-Parts from CAD files.
+Parts from CAD files, and parts to print.
 
 Examples:
   apo-bench part import bracket.step --out parts
-  apo-bench part import bracket.stl --unit mm --name hole1=bore --out parts
+  apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
 """
 commands = make_group("part", _HELP)
 
@@ -73,6 +74,36 @@ def part_import(
         print_json(report_file(source, file, imported, poses))
     refused = [*source.left_out, *refused]
     require(not refused, f"{file}: {len(refused)} of its solids became no parts: {' '.join(refused)}")
+
+
+@commands.command("export", cls=Command)
+def part_export(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, make_path_option("Folder of the kit.")],
+    clearance_mm: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=5.0, help="Clearance of your printer, per side, in mm; default: as the scenario."),
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, max=1000, help="Trials in the form.")] = 20,
+    method: Annotated[list[str] | None, typer.Option(help="Method in the form; may be repeated.")] = None,
+    step: Annotated[bool, typer.Option("--step", help="Write STEP files, too.")] = False,
+) -> None:
+    """Write a kit for a real robot: parts and a plate to print (STL), places of tags, and a form for the results.
+
+    Examples:
+      apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
+      apo-bench part export pocket_table --step --trials 30 --method uncorrected --method contact --out kit
+    """
+    from apo_bench.formats.kit import write_kit
+    from apo_bench.scenario import load_scenario
+
+    task = load_scenario(scenario)
+    clearance = task.clearance_mm if clearance_mm is None else clearance_mm
+    with name_write_errors(f"--out {out}"):
+        files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], trials, step)
+    for file, count in files.items():
+        typer.echo(f"{file}: print {count}")
+    typer.echo(f"{out / 'tags.csv'}: where tags lie on the plate; {out / 'form.csv'}: fill in, one line a trial")
 
 
 def _import_solids(

@@ -46,6 +46,10 @@ def score_command(
         Path | None,
         make_path_option("Noise file of `noise fit`: score this pose estimator, by default in the track `measured`."),
     ] = None,
+    results: Annotated[
+        Path | None,
+        make_path_option("Form of `part export`, filled in: trials of a real robot; nothing is simulated."),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the entry in tables; default: the method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a few seeds of each condition, as a test.")] = False,
     secret_seed_file: Annotated[
@@ -62,13 +66,13 @@ def score_command(
 
     Examples:
       apo-bench score contact --out entries/contact.json
-      apo-bench score mine:correct --track given --quick --out entry.json
+      apo-bench score contact --results form.csv --out real.json
     """
-    from apo_bench.benchmark.scoring.entry import check_name, form_of, read_entry, write_entry
+    from apo_bench.benchmark.scoring.entry import check_name, read_entry, write_entry
     from apo_bench.benchmark.scoring.program import program_method
+    from apo_bench.benchmark.scoring.real_form import read_real_entry
     from apo_bench.benchmark.scoring.score import score
     from apo_bench.benchmark.scoring.track import read_tracks, seen_by
-    from apo_bench.viz.form_text import form_table
 
     require((method is None) != (command is None), "name either METHOD or --command.")
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
@@ -90,17 +94,29 @@ def score_command(
     name = name or command
     check_name("entry", name or method or "")
     records = out.with_suffix("")
-    with program_method(command, records) if command else nullcontext(str(method)) as found:
-        entry = score(
-            found,
-            tracks,
-            records,
-            name=name,
-            command=shlex.join(["apo-bench", *sys.argv[1:]]),
-            said=lambda each: say(f"{each.name}: {each.title}", as_json),
-            **how,
-        )
+    line = shlex.join(["apo-bench", *sys.argv[1:]])
+    if results is not None:
+        require(method is not None, "--results needs METHOD, as the form names it.")
+        entry = read_real_entry(results, str(method), name, line)
+    else:
+        with program_method(command, records) if command else nullcontext(str(method)) as found:
+            entry = score(
+                found,
+                tracks,
+                records,
+                name=name,
+                command=line,
+                said=lambda each: say(f"{each.name}: {each.title}", as_json),
+                **how,
+            )
     write_entry(entry, out)
+    _print_entry(entry, out, as_json)
+
+
+def _print_entry(entry: Any, out: Path, as_json: bool) -> None:
+    from apo_bench.benchmark.scoring.entry import form_of
+    from apo_bench.viz.form_text import form_table
+
     if as_json:
         print_json(form_of(entry))
         return

@@ -278,7 +278,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """Replay this plan on zeros, until the next reset; for wrappers.
 
         Args:
-            target_poses, schedule, step_poses: As in `Plan`; default: every operation once, in order.
+            target_poses: (n, 4, 4), world frame, [m].
+            schedule: As in `Plan`; default: every operation once, in order.
+            step_poses: As in `Plan`; default: the target poses.
             correction: The correction that the poses come from; the predicted success takes its covariance.
         """
         plan = Plan(self.assembly, self.observation.start, target_poses, tuple(schedule))

@@ -4,7 +4,7 @@
 
 The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free,
 that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
-about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
+about each axis of the part (then those that are assumed), and whether the operation was observed (default). One more
 column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
 """
 

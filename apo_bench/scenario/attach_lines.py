@@ -19,7 +19,7 @@ _THROUGH = 1e-3
 
 @lru_cache(maxsize=32)
 def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
-    """The operations of a scenario at its nominal goals."""
+    """The operations of a scenario at its nominal poses."""
     lines = [attach.stated for attach in scenario.attach]
     return understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, lines)
 
@@ -31,7 +31,7 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
         stated: What the file says of them.
 
     Raises:
-        InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
+        InputError: A stated direction leads through what the part has to touch, or a stated line begins inside of it.
     """
     operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, stated)
     for each, preference in zip(operations, stated, strict=True):

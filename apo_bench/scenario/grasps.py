@@ -23,7 +23,7 @@ _RAISED = 0.15
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
-"""Width that the arm can hold where the file does not say how: so much room its fingers want before they close."""
+"""Width that the arm can hold where the file does not say how: so much space its fingers need before they close."""
 MOST_TILT_DEG = 45.0
 """A hand is tilted by no more."""
 _LEVEL = 1e-6
@@ -33,7 +33,7 @@ _LEVEL = 1e-6
 def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: Array) -> Grasp:
     """The grasp; unless the file says otherwise, above the middle, across the narrower level axis of a part of boxes.
 
-    Where that leaves pads beside the part, and of other parts, it is the best place that the shape offers.
+    Where that leaves pads off the part, and of other parts, it is the best place that the shape offers.
 
     Args:
         place: File and key, for messages.

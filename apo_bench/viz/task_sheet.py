@@ -1,6 +1,6 @@
-"""The task sheet of a scenario, in Markdown: everything in it is read from the scenario."""
+"""The task sheet of a scenario in Markdown."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
@@ -9,30 +9,36 @@ from apo_bench.assembly import Layout, build_relation_graph, compute_joint_play_
 from apo_bench.geometry import Array
 from apo_bench.io import join_words
 from apo_bench.judging.finished import fixtures
+from apo_bench.records import Thresholds
 from apo_bench.scenario import NOTHING_M, Scenario, Turn, spread_error
 from apo_bench.viz.form_text import format_value
 
 
 def task_sheet(scenario: Scenario, level: int = 1) -> str:
-    """The sheet of a scenario under a heading of that level."""
-    mark = "#" * level
-    parts = [
-        f"{name}{'' if path.stem == name else f' ({path.stem})'}{', fixed' if name in scenario.assembly.fixed else ''}"
-        for name, path in scenario.part_files.items()
-    ]
-    sections = {
-        f"{mark} {scenario.name}: {scenario.title}": f"In the paper: {scenario.paper}." if scenario.paper else "",
-        f"{mark}# Parts": _bullets(parts),
-        f"{mark}# Operations": "\n".join(_describe_operations(scenario)),
-        f"{mark}# Human": _bullets(filter(None, (scenario.human, _describe_human_error(scenario)))),
-        f"{mark}# Variations": _bullets(_describe_variations(scenario)),
-        f"{mark}# Success": _bullets(_describe_success(scenario)),
+    """Describe a scenario in Markdown.
+
+    Args:
+        level: Level of its heading, from 1.
+    """
+    facts = {
+        "In the paper": scenario.paper,
+        "Parts": ", ".join(_describe_parts(scenario)),
+        "Human": scenario.human,
+        "Human error": _describe_human_error(scenario),
+        "Layout": "; ".join(_describe_variations(scenario)),
+        "Success": scenario.success,
+        **_describe_verdict(scenario),
     }
-    return "\n\n".join(filter(None, (text for section in sections.items() for text in section))) + "\n"
+    bullets = [f"- {name}: {text.removesuffix('.')}." for name, text in facts.items() if text]
+    head = f"{'#' * level} {scenario.name}: {scenario.title}"
+    return "\n".join([head, "", *_describe_operations(scenario), "", *bullets]) + "\n"
 
 
-def _bullets(lines: Iterable[str]) -> str:
-    return "\n".join(f"- {line}" for line in lines)
+def _describe_parts(scenario: Scenario) -> Iterator[str]:
+    """`table (fixed)`, `B (block)`."""
+    for name, path in scenario.part_files.items():
+        notes = ["fixed"] * (name in scenario.assembly.fixed) + [path.stem] * (path.stem != name)
+        yield f"{name} ({', '.join(notes)})" if notes else name
 
 
 def _describe_operations(scenario: Scenario) -> Iterator[str]:
@@ -48,7 +54,7 @@ def _describe_operations(scenario: Scenario) -> Iterator[str]:
 def _describe_human_error(scenario: Scenario) -> str:
     error = scenario.human_error
     if error is None:
-        return "The scenario states no human error."
+        return "none"
     # a displaced face leads later operations astray
     offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), error.axis).offsets
     mains = [operation.main for operation in scenario.assembly.operations]
@@ -56,9 +62,8 @@ def _describe_human_error(scenario: Scenario) -> str:
     followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
     follow = f"; {join_words(followers)} {'follows' if len(followers) == 1 else 'follow'}" if followers else ""
     return (
-        f"At `human_error_scale` 1, operation {error.operation + 1} displaces {mains[error.operation]} by "
-        f"{_format_span(error.low_m, error.high_m)} mm along {_name_axis(error.axis)}, to either side{follow}; "
-        "the human repairs this at the last operation, after the last observation."
+        f"operation {error.operation + 1} displaces {mains[error.operation]} by "
+        f"{_format_span(error.low_m, error.high_m)} mm along {_name_axis(error.axis)}{follow}"
     )
 
 
@@ -66,31 +71,28 @@ def _describe_variations(scenario: Scenario) -> Iterator[str]:
     site = scenario.site
     x, y = (f"{c * 1e3:g} ± {s * 1e3:g}" for c, s in zip(site.center_m, site.spread_m, strict=True))
     low, high = np.degrees(site.yaw_rad)
-    names = [f"Operation {k}: {operation.main}" for k, operation in enumerate(scenario.assembly.operations, start=1)]
-    yield f"Place of the assembly: x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees."
+    names = [f"operation {k}: {operation.main}" for k, operation in enumerate(scenario.assembly.operations, start=1)]
+    yield f"x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees"
     for shift in scenario.shifts:
         span = _format_span(shift.low_m, shift.high_m)
-        yield f"{names[shift.operation]} by {span} mm along {_name_axis(shift.axis)}."
+        yield f"{names[shift.operation]} by {span} mm along {_name_axis(shift.axis)}"
     for turn in scenario.turns:
         degrees = f"{np.degrees(turn.low_rad):g} to {np.degrees(turn.high_rad):g} degrees"
-        yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_through(turn)}."
+        yield f"{names[turn.operation]} by {degrees} about {_name_axis(turn.axis)}{_through(turn)}"
 
 
-def _describe_success(scenario: Scenario) -> list[str]:
-    """What is particular to the scenario; the page on the judge explains the thresholds."""
-    thresholds = format_value(asdict(scenario.thresholds))
-    margin_mm = scenario.thresholds.fit_margin_mm
-    away = sorted(fixtures(scenario.assembly))
-    wider = "; ".join(f"{contact} by {play + margin_mm:.2f} mm" for contact, play in sorted(_list_wider(scenario)))
-    facts = {
-        scenario.success: scenario.success,
-        f"Success means: {scenario.success_means.replace('_', ' ')}.": True,
-        f"Thresholds, at {scenario.clearance_mm:g} mm clearance per side: {thresholds}.": True,
-        f"Some faces have more play, so they may be farther apart: {wider}.": wider,
-        f"Fixtures, which may end anywhere: {join_words(away)}.": away,
-        f"Contact equations count as solved below {scenario.gap_mm:g} mm.": True,
+def _describe_verdict(scenario: Scenario) -> dict[str, str]:
+    """What the judge uses, as far as it is not the default."""
+    thresholds = scenario.thresholds
+    changed = dict(asdict(thresholds).items() - asdict(Thresholds()).items())
+    wider = (f"{contact} {play + thresholds.fit_margin_mm:.2f} mm" for contact, play in sorted(_list_wider(scenario)))
+    return {
+        "Verdict": "as demonstrated" if scenario.success_means == "as_demonstrated" else "",
+        "Clearance per side": f"{scenario.clearance_mm:g} mm",
+        "Thresholds": format_value(changed) if changed else "",
+        "Allowed gaps beyond the clearance": "; ".join(wider),
+        "Fixtures": join_words(sorted(fixtures(scenario.assembly))),
     }
-    return [sentence for sentence, holds in facts.items() if holds]
 
 
 def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:

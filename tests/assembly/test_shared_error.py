@@ -22,13 +22,6 @@ C = np.diag(np.repeat([2e-3, 0.03], 3) ** 2)
 P = pose.at((0.3, -0.1, 0.8), (160.0, 10.0, 25.0))
 
 
-def test_a_twist_in_a_frame_of_the_world_moves_every_goal_alike() -> None:
-    """T_k = P exp(c) P^-1 T_seen_k = T_seen_k exp(A_k c), for a twist of any size."""
-    c = np.array([0.03, -0.02, 0.05, 0.4, -0.3, 0.7])
-    ways = SharedError("camera", (0, 1, 2), C, P).ways(GOALS)
-    assert_allclose(GOALS @ pose.exp(ways @ c), P @ pose.exp(c) @ pose.inverse(P) @ GOALS, atol=1e-12)
-
-
 def test_what_is_shared_stands_beside_the_diagonal() -> None:
     own = np.tile(np.diag(np.repeat([1e-3, 0.01], 3) ** 2), (3, 1, 1))
     camera = SharedError("camera", (0, 2), C, P)

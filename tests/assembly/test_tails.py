@@ -59,13 +59,3 @@ def test_no_error_is_longer_than_the_limit_and_joined_ones_are_large_together() 
         return float(np.corrcoef(shift, turn)[0, 1])
 
     assert together(True) > 0.15 > 0.05 > abs(together(False))
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("scales", np.zeros(4)), ("variances", np.ones(3))],
-)
-def test_numbers_that_make_no_sense_are_refused(name: str, value: np.ndarray) -> None:
-    numbers = {"scales": SCALES, "freedom": FREEDOM, "variances": SCALES**2, "limits": np.ones(2), name: value}
-    with pytest.raises(ValueError, match=r"above 0|shape"):
-        Tails(FRAMES, **numbers)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import correct
-from apo_bench.assembly import build_contact_equations
-from benchmarks.corrector import MANY, METHODS, find_optimum, measure, whitened
+from benchmarks.corrector import find_optimum, whitened
 from benchmarks.corrector_problems import observe, problem
 
 pytestmark = pytest.mark.numeric
@@ -23,14 +22,3 @@ def test_contact_makes_the_shortest_correction_that_closes_every_contact(name: s
     assert found.gap_after_m < 1e-10
     assert np.linalg.norm(whitened(observation, found.poses)) == pytest.approx(np.linalg.norm(best), rel=1e-6)
     assert np.linalg.norm(whitened(observation, correct(observation, "paper").poses)) > np.linalg.norm(best)
-
-
-@pytest.mark.parametrize("name", ["fig2", "chain3", "grid2"])
-def test_problems_are_consistent(name: str) -> None:
-    of = problem(name)
-    assert build_contact_equations(of.assembly, of.start, of.poses).gaps(of.poses).max() < 1e-12
-
-
-def test_every_method_is_timed() -> None:
-    observations = [observe(problem("fig2"), seed) for seed in range(2)]
-    assert all(measure(method, observations).ms > 0.0 for method in (*METHODS, MANY))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 
@@ -42,28 +41,6 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
     assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4", "NUMBA_CPU_NAME": "generic"}
 
 
-@pytest.mark.parametrize(
-    ("plain", "words"),
-    [
-        (replace(BARE, numpy=("X86_V3",)), r"is not run: \('X86_V3',\) stay on"),
-        (replace(BARE, numba=OWN.numba), "is not run: .*znver4.* stay on"),
-        ("a process under it ended with 1", "is not run: a process under it ended with 1"),
-    ],
-)
-def test_features_that_stay_on_are_named(monkeypatch: pytest.MonkeyPatch, plain: Kernels | str, words: str) -> None:
-    (said,) = found(monkeypatch, OWN, {}, plain)
-    assert re.search(words, said)
-
-
-def test_where_there_is_nothing_to_switch_nothing_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither OpenBLAS nor Numba nor any feature above the least, as on some machines that are not x86."""
-    none = Kernels((), (), ())
-    assert found(monkeypatch, none, {"Haswell": OWN}, none) == [
-        "vector features off is not run again: NumPy and Numba use none on this processor",
-        "Haswell is not run: neither NumPy nor SciPy uses OpenBLAS",
-    ]
-
-
 def test_a_process_says_when_it_has_not_the_kernels_that_it_was_started_for(monkeypatch: pytest.MonkeyPatch) -> None:
     here = switches.in_use()
     monkeypatch.setenv(EXPECTED, json.dumps(asdict(here)))
@@ -72,22 +49,3 @@ def test_a_process_says_when_it_has_not_the_kernels_that_it_was_started_for(monk
     assert "not" in str(switches.missing())
     monkeypatch.delenv(EXPECTED)
     assert switches.missing() is None
-
-
-def test_every_kernel_has_its_command_and_one_that_fails_is_not_lost(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(switches, "under", lambda asked: OWN)
-    names = ("one", "two", "three")
-    monkeypatch.setattr(
-        switches,
-        "switches",
-        lambda own: iter([*(Switch(name, {"NAME": name}, own) for name in names), "four is not run"]),
-    )
-    for failing, code in (("none", 0), ("two", 1)):
-        asked = f'echo "$NAME of $APO_BENCH_KERNELS"; echo aside >&2; test "$NAME" != {failing}'
-        assert switches.main(["sh", "-c", asked]) == code
-        said = capsys.readouterr().out
-        assert "-- four is not run\n" in said
-        for name in names:
-            assert f"-- under {name}\n{name} of {json.dumps(asdict(OWN))}\naside\n" in said

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +10,7 @@ import pytest
 import typer
 
 from apo_bench.cli.app import app, main
-from apo_bench.cli.shared import GROUPS, OPTIONS, complete_last_word
+from apo_bench.cli.shared import GROUPS, OPTIONS
 from apo_bench.cli.shared.completion import offered_names
 from apo_bench.cli.shared.help import OTHERS
 from apo_bench.perception.observation.noise import NOISES, NoiseLevel, make_noise
@@ -29,20 +27,6 @@ def commands(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[
 
 
 EVERY = dict(commands(typer.main.get_command(app)))
-
-
-def complete(shell: str, typed: str) -> list[str]:
-    """What the program answers a shell; bash counts words, the others send the line."""
-    program = "import sys; sys.argv[0] = 'apo-bench'; from apo_bench.cli.app import main; sys.exit(main([]))"
-    asked = {
-        "_APO_BENCH_COMPLETE": f"complete_{shell}",
-        "COMP_WORDS": typed,
-        "COMP_CWORD": str(len(typed.split(" ")) - 1),
-        "_TYPER_COMPLETE_ARGS": typed,
-        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-    }
-    done = subprocess.run([sys.executable, "-c", program], env=asked, capture_output=True, text=True, check=True)
-    return done.stdout.split()
 
 
 def test_every_command_stands_under_one_heading() -> None:
@@ -91,30 +75,3 @@ def test_offered_names_are_the_known_names() -> None:
     assert set(NOISES) < set(offered_names("noise"))
     for name in offered_names("noise"):
         assert make_noise(name, NoiseLevel(1.0, 1.0))
-
-
-def test_after_a_comma_a_name_that_is_there_is_not_offered_again() -> None:
-    offered = complete_last_word("method")
-    assert offered("contact-r") == ["contact-refuse", "contact-robust"]
-    assert offered("contact-refuse,contact-r") == ["contact-refuse,contact-robust"]
-    assert offered("x") == []
-
-
-@pytest.mark.parametrize(
-    ("shell", "typed", "words", "not_offered"),
-    [
-        ("bash", "apo-bench sweep stick_in_tower --method oracle,contact", "oracle,contact-robust", "paper"),
-        ("fish", "apo-bench run stick_in_tower --noise mega", "megapose-tless", "isotropic"),
-    ],
-)
-def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: str, not_offered: str) -> None:
-    offered = " ".join(complete(shell, typed))
-    assert words in offered
-    assert not_offered not in offered
-
-
-def test_completion_loads_no_simulator() -> None:
-    names = "[offered_names(what) for what in ('scenario', 'noise', 'arm')]"
-    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.shared.completion import offered_names; {names}"
-    check = f"{program}; sys.exit(any(name in sys.modules for name in ('mujoco', 'scipy', 'matplotlib', 'mink')))"
-    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

@@ -56,8 +56,6 @@ def test_a_log_becomes_files_that_are_read_again(folder: Path, capsys: pytest.Ca
     [
         (("--out", "a.json"), "need --scenario"),
         (("--out", "log.csv", "--scenario", NAME), "is a file that the command reads"),
-        (("--out", "a.json", "--scenario", NAME, "--unseen", "9"), "operations from 1 to"),
-        (("--out", "a.json", "--scenario", NAME, "--ends", "1,2", "--unseen", "1"), "exclude each other"),
     ],
 )
 def test_a_request_that_contradicts_itself_is_one_sentence(
@@ -68,15 +66,3 @@ def test_a_request_that_contradicts_itself_is_one_sentence(
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
-
-
-def test_a_log_that_is_refused_is_drawn_as_it_was_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    known = '[known]\nA = { at_mm = [0, 0, 300], turn_deg = [90, 0, 0] }\nB = "start"\n'
-    (folder / "c.toml").write_text(f'schema = "apo-bench/camera/1"\n{known}', encoding="utf-8")
-    out = ("--out", str(folder / "a.json"), "--scenario", NAME)
-    assert run(folder, *out, "--picture", str(folder / "p.png")) == 2
-    said = capsys.readouterr()
-    assert "no contact fits as it is stated" in said.err
-    assert "p.png, as the log was read" in said.out
-    assert (folder / "p.png").stat().st_size > 10_000
-    assert not (folder / "a.json").exists()

@@ -68,18 +68,6 @@ def test_other_assemblies_are_refused() -> None:
         )
 
 
-def test_no_operations_and_no_contacts() -> None:
-    scene = scenes.stick_in_tower()
-    bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
-    seen = [replace(one, assembly=bare) for one in draws(scene, 3)]
-    for made, one in zip(correct_many(seen, contact), seen, strict=True):
-        assert made.ok
-        assert_allclose(made.poses, one.poses, rtol=0, atol=0)
-    still = scenes.Scene(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4)))
-    nothing = scenes.seen(still, still.goals)
-    assert [made.status for made in correct_many([nothing, nothing], contact)] == ["converged", "converged"]
-
-
 def test_by_default_they_are_corrected_as_one_is() -> None:
     """Of four one has a part seen elsewhere, and one a part that was not seen."""
     plain = draws(scenes.stick_on_castles(), 4)

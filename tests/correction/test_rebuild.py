@@ -46,11 +46,7 @@ def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:
 
 
 @pytest.mark.parametrize(
-    ("name", "step", "wrong_mm"),
-    [
-        ("carried_bridge", 5, {1: (0, 3, 0)}),
-        ("pocket_table", 6, {1: (3, 0, 0)}),
-    ],
+    ("name", "step", "wrong_mm"), [("carried_bridge", 5, {1: (0, 3, 0)}), ("pocket_table", 6, {1: (3, 0, 0)})]
 )
 def test_the_robot_takes_apart_what_was_wrong_and_builds_it_again(
     name: str, step: int, wrong_mm: Mapping[int, Sequence[float]]
@@ -61,17 +57,3 @@ def test_the_robot_takes_apart_what_was_wrong_and_builds_it_again(
     assert (tried.result.outcome.code, tried.verdict.demonstrated.code) == ("ok", "ok")
     assert tried.verdict.success
     assert tried.verdict.demonstrated.displaced_mm < 0.5
-
-
-def test_a_group_is_taken_down_as_a_group_and_all_of_it_undone() -> None:
-    scene = scene_of("carried_bridge")
-    n = len(scene.scenario.assembly)
-    schedule = (*(Step(k) for k in range(n)), *(Step(k, undo=True) for k in reversed(range(n))))
-    tried = built(scene, schedule, {})
-    assert tried.result.outcome.code == "ok"
-    layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
-    final = tried.result.reached.final
-    assert final is not None
-    for part, T in layout.start.items():
-        assert np.linalg.norm(final.poses[part][:3, 3] - T[:3, 3]) < 0.002
-    assert all(snapshot is None for snapshot in tried.result.reached.after)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
 
 import apo_bench
 from apo_bench.envs.apo_replay import APOReplay
@@ -40,27 +39,6 @@ def test_every_key_of_observation_and_info_stands_in_its_table() -> None:
     named = {key for line in lines_of("Info") for key in re.findall(r"`(\w+)`", line.split("|")[2])}
     assert named == told.keys() | ended.keys()
     assert {line.split("|")[1].strip(" `") for line in lines_of("Observation space")} == seen.keys()
-
-
-def test_without_same_step_every_second_step_only_resets() -> None:
-    rewards = {}
-    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
-        many = gymnasium.make_vec(
-            "APOReplay-v0",
-            num_envs=1,
-            vectorization_mode="sync",
-            vector_kwargs={"autoreset_mode": mode},
-            scenario="block_on_block",
-            grasp="weld",
-            noise_level=0.1,
-        )
-        many.reset(seed=0)
-        action = np.zeros(many.action_space.shape)
-        rewards[mode] = [many.step(action)[1:3] for _ in range(2)]
-        many.close()
-    usual, same = ([(r.item(), t.item()) for r, t in found] for found in rewards.values())
-    assert usual == [(1.0, True), (0.0, False)]
-    assert same == [(1.0, True), (1.0, True)]
 
 
 def test_the_rates_on_the_page_are_those_that_are_kept() -> None:

@@ -19,12 +19,6 @@ def program(title: str, **replaced: str) -> str:
     return str(text)
 
 
-def test_each_has_at_most_twelve_lines_of_code() -> None:
-    assert len(PROGRAMS) == 3
-    for _, text in PROGRAMS:
-        assert len([line for line in text.splitlines() if line.strip()]) <= 12
-
-
 def test_ppo_learns_and_is_evaluated() -> None:
     pytest.importorskip("stable_baselines3")
     text = (

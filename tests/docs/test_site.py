@@ -58,17 +58,6 @@ def test_formulas_become_mathml_in_lines_and_alone(hooks: Any) -> None:
     assert 'display="block"' in alone
 
 
-def test_short_names_are_marked_as_whole(hooks: Any) -> None:
-    text = "<td><code>--robot-error</code> <code>two words</code></td>"
-    marked = hooks.on_page_content(text, None, None, None)
-    assert marked == text.replace("<code>--", '<code class="whole">--')
-
-
-def test_what_is_no_formula_stays(hooks: Any) -> None:
-    text = "<pre><code>echo $HOME costs $5</code></pre>"
-    assert hooks.on_page_content(text, None, None, None) == text
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_nothing_is_cut_in_a_usual_window_and_no_page_is_wider_than_a_phone(

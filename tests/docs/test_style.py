@@ -1,4 +1,4 @@
-"""Help texts, public docstrings and error messages use plain technical words."""
+"""Help texts, public docstrings, error messages and pages use plain technical words."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import apo_bench
 from apo_bench.cli.app import app
 
 PACKAGE = Path(apo_bench.__file__).parent
+DOCS = Path(__file__).parents[2] / "docs"
 FORBIDDEN = re.compile(
     r"\b(shall|whoever|anew|besides?|foretell\w*|mend(s|ed|ing)?|of its own|of one's own|comes? along|nobody asks"
     r"|careless\w*|by heart|salt(ed)?|the eye)\b",
@@ -53,6 +54,11 @@ def messages() -> Iterator[tuple[str, str]]:
                         yield f"{path.relative_to(PACKAGE)}:{text.lineno}", text.value
 
 
-@pytest.mark.parametrize("texts", [help_texts, public_docstrings, messages])
+def pages() -> Iterator[tuple[str, str]]:
+    for path in (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))):
+        yield str(path.relative_to(DOCS.parent)), path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("texts", [help_texts, public_docstrings, messages, pages])
 def test_texts_for_users_are_plain(texts: type[Iterator[tuple[str, str]]]) -> None:
     assert [(where, found[0]) for where, text in texts() if (found := FORBIDDEN.search(text))] == []

@@ -7,11 +7,9 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import pytest
 from gymnasium.utils.env_checker import check_env
 
 from apo_bench.envs.apo_assemble import APOAssemble
-from apo_bench.errors import InputError
 
 STILL = np.zeros(7, dtype=np.float32)
 OPEN = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
@@ -57,9 +55,3 @@ def test_the_last_part_dropped_before_its_mouth_makes_the_whole_wrong() -> None:
         seen, reward, over, _, info = env.step(OPEN if last else STILL)
     assert last
     assert (reward, info["success"], info["code"]) == (0.0, False, "overlap")
-
-
-def test_settings_that_are_of_one_operation_alone_are_not_taken() -> None:
-    for name in ("operation", "probe"):
-        with pytest.raises(InputError, match=f"{name} was given; all operations are done"):
-            APOAssemble(scenario="block_on_block", **{name: 1})

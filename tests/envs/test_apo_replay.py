@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import copy
-import pickle
-import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.spaces import Box
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObservation
 
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialConfig, correct, run_trial
 from apo_bench.assembly import Outcome, Step
 from apo_bench.envs import episode, robot
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.records import outcomes
@@ -93,16 +86,6 @@ def _boxes(env: APOReplay) -> list[Any]:
     return [env.action_space, env.observation_space["poses"], env.observation_space["covariance"]]
 
 
-def test_a_learner_may_write_into_what_it_was_given(env: APOReplay) -> None:
-    first, _ = env.reset(seed=SEED)
-    kept = {key: value.copy() for key, value in first.items()}
-    for value in first.values():
-        value[:] = 0
-    again, _ = env.reset(seed=SEED)
-    for key, value in kept.items():
-        np.testing.assert_array_equal(again[key], value)
-
-
 def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
     first, _ = env.reset(seed=SEED)
     other, _ = env.reset()
@@ -122,15 +105,6 @@ def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
     assert reached == row["reached"]
 
 
-def test_an_episode_that_fails_is_the_row_of_its_trial() -> None:
-    """Zeros, bare, are method `uncorrected`; at this level the plan is refused before the arm moves."""
-    env = APOReplay("block_on_block", grasp="weld", noise_level=40)
-    spec = TrialConfig("block_on_block", noise_mm=40.0, noise_deg=40.0, grasp="weld", method="uncorrected", seed=SEED)
-    row = run_trial(spec, env._scene)
-    assert row["success"] is False
-    _check_episode(env, row)
-
-
 def _check_episode(env: Any, row: dict[str, Any]) -> None:
     env.reset(seed=SEED)
     _, reward, terminated, truncated, info = env.step(zeros(env))
@@ -141,20 +115,6 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
     assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
     assert info["operation"] == row["failure_operation"]
     assert info["failure_prediction"] == row["failure_prediction"]
-
-
-def test_an_action_moves_each_goal_in_the_frame_of_its_part(
-    watched: APOReplay, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[Any] = []
-    monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
-    watched.reset(seed=SEED)
-    twist = np.linspace(-0.09, 0.09, 18).reshape(3, 6)
-    watched.step(twist)
-    watched.reset(seed=SEED)
-    watched.step(zeros(watched))
-    np.testing.assert_allclose(asked[0].target_poses, watched.observation.poses @ pose.exp(twist), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(asked[1].target_poses, watched.observation.poses)
 
 
 def _nothing() -> Any:
@@ -251,25 +211,6 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     np.testing.assert_array_equal(asked[1].step_poses, made.step_poses)
 
 
-def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
-    """One episode ends without an operation to name, the other with one, in either order."""
-    many: Any = gymnasium.vector.VectorEnv()
-    many.num_envs = 2
-    endings = [
-        {
-            "operation": nullable(k),
-            "failure_prediction": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x}),
-        }
-        for k, x in ((3, 1.5), (None, None))
-    ]
-    for order in (endings, endings[::-1]):
-        infos = many._add_info(many._add_info({}, order[0], 0), order[1], 1)
-        assert infos["operation"].tolist() == [info["operation"] for info in order]
-        assert infos["failure_prediction"]["size_mm"].tolist() == [
-            info["failure_prediction"]["size_mm"] for info in order
-        ]
-
-
 def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     _, first = watched.reset(seed=SEED)
     _, _, _, _, info = watched.step(np.full((3, 6), 0.05))
@@ -315,13 +256,6 @@ def test_one_step_is_one_episode(watched: APOReplay) -> None:
     watched.step(np.full((3, 6), 0.05))
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         watched.step(zeros(watched))
-
-
-@pytest.mark.parametrize("action", [np.full((3, 6), np.nan), np.full((3, 6), 0.6), np.zeros(18)])
-def test_an_action_outside_the_space_is_refused(watched: APOReplay, action: Any) -> None:
-    watched.reset(seed=SEED)
-    with pytest.raises(InputError, match=r"action of shape"):
-        watched.step(action)
 
 
 def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -370,69 +304,17 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     assert watched.trial == calls[1] != calls[0]
 
 
-def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
-    watched: APOReplay, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import apo_bench.envs.episode as module
-
-    shown = module.simulate_demonstration(watched._scene, 1.0, SEED, "noise")
-    failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
-    monkeypatch.setattr(module, "simulate_demonstration", lambda *_: failed)
-    with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row failed with a human error scale"):
-        watched.reset()
-
-
-def test_poses_may_be_measured_in_depth_images() -> None:
-    env = APOReplay("block_on_block", pose_source="depth-camera", noise_level=1.0)
-    first, _ = env.reset(seed=SEED)
-    again, _ = env.reset(seed=SEED)
-    drawn, _ = APOReplay("block_on_block", noise_level=1.0).reset(seed=SEED)
-    shown, _ = APOReplay("block_on_block", noise_level=0.0).reset(seed=SEED)
-    for key, x in first.items():
-        np.testing.assert_array_equal(x, again[key])
-    assert first["observed"].all()
-    off = np.linalg.norm(first["poses"][:, :3] - shown["poses"][:, :3], axis=1)
-    assert (off < 2e-3).all()
-    assert not np.array_equal(first["poses"], drawn["poses"])
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
         ({"noise_level": "1"}, "level of APOReplay must be a number or a list"),
-        ({"noise_level": (1, 2, 3)}, "a pair of mm and degrees"),
         ({"noise": "isotropc"}, "did you mean 'isotropic'"),
-        (
-            {"fidelity": "near-contact", "grasp": "weld"},
-            "the fidelity 'near-contact' was given together with the grasp 'weld'",
-        ),
         ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         APOReplay(**arguments)
-
-
-def test_corrected_wraps_only_this_environment(env: APOReplay) -> None:
-    with pytest.raises(InputError, match="did you mean 'paper'"):
-        apo_bench.CorrectPoses(env, "papr")
-    with pytest.raises(InputError, match="wraps an APOReplay"):
-        apo_bench.CorrectPoses(gymnasium.make("CartPole-v1"))
-
-
-def test_make_takes_every_argument_and_a_copy_travels() -> None:
-    made = gymnasium.make(
-        "APOReplay-v0", scenario="block_on_block", noise_level=(0.5, 0.25), human_error_scale=0.0,
-        noise="isotropic", grasp="weld",
-        clearance_mm=0.4, arm="six_axis", render_mode=None,
-    )  # fmt: skip
-    seen, _ = made.reset(seed=1)
-    assert np.sqrt(seen["covariance"][0, 0, 0]) == pytest.approx(0.5e-3)
-    assert np.sqrt(seen["covariance"][0, 5, 5]) == pytest.approx(np.radians(0.25))
-    again = gymnasium.make(pickle.loads(pickle.dumps(made.spec)))
-    np.testing.assert_array_equal(again.reset(seed=1)[0]["poses"], seen["poses"])
 
 
 def test_a_picture_without_a_display(small: APOReplay) -> None:
@@ -452,70 +334,6 @@ def test_a_picture_without_a_display(small: APOReplay) -> None:
     assert np.abs(before.astype(int) - after.astype(int)).max() > 50
 
 
-def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-    true = robot.replay_and_judge
-
-    def replay_and_judge(*args: Any, **more: Any) -> Any:
-        asked.append(args[4].fidelity)
-        return true(*args, **more)
-
-    monkeypatch.setattr(REPLAY, replay_and_judge)
-    row = run_trial(TrialConfig("block_on_block", fidelity="near-contact", method="uncorrected", seed=SEED))
-    made = APOReplay("block_on_block", fidelity="near-contact")
-    made.reset(seed=SEED)
-    *_, info = made.step(zeros(made))
-    assert (asked, info["code"]) == (["near-contact"], "ok")
-    assert info["is_success"] is info["success"] is row["success"]
-
-
-def test_what_evaluation_tools_pass_is_no_option(small: APOReplay) -> None:
-    first, _ = small.reset(seed=SEED, options={"lerobot_new_rollout": True, "noise_level": 2.0})
-    again, _ = small.reset(seed=SEED, options={"noise_level": 2.0})
-    np.testing.assert_array_equal(first["poses"], again["poses"])
-
-
-def test_wrappers_of_gymnasium_make_it_flat_and_float32() -> None:
-    base = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld")
-    flat = FlattenObservation(base)
-    bounds = Box(np.float32(flat.observation_space.low), np.float32(flat.observation_space.high))
-    env = RescaleAction(TransformObservation(flat, np.float32, bounds), np.float64(-1), np.float64(1))
-    seen, _ = env.reset(seed=SEED)
-    assert env.observation_space.contains(seen)
-    assert seen.dtype == np.float32
-    rng = np.random.default_rng(1)
-    for _ in range(100):
-        action = rng.choice([-1.0, 1.0, 0.3], env.action_space.shape).astype(np.float32)
-        assert base.action_space.contains(np.asarray(env.action(action), dtype=np.float64))
-    np.testing.assert_array_equal(env.action(zeros(env).astype(np.float32)), zeros(base))
-
-
-def test_the_human_mode_watches_the_replay_and_closes(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
-    windows: list[Any] = []
-
-    class Window:
-        def __init__(self, scene: Any) -> None:
-            self.ticks = 0
-            self.closed = False
-            windows.append(self)
-
-        def __call__(self, data: Any) -> None:
-            self.ticks += 1
-
-        def close(self) -> None:
-            self.closed = True
-
-    monkeypatch.setattr("apo_bench.simulation.scene.render.ReplayWindow", Window)
-    monkeypatch.setattr(watched, "render_mode", "human")
-    watched.reset(seed=SEED)
-    assert watched.render() is None
-    assert not windows
-    watched.step(np.full((3, 6), 0.05))
-    watched.close()
-    assert (len(windows), windows[0].closed) == (1, True)
-    assert windows[0].ticks > 10
-
-
 @pytest.mark.slow
 def test_gymnasium_finds_nothing_to_warn_of() -> None:
     with warnings.catch_warnings():
@@ -528,18 +346,3 @@ def test_gymnasium_finds_nothing_to_warn_of() -> None:
         made = gymnasium.make("APOReplay-v0")
         made.reset(seed=0)
         made.step(np.full((3, 6), 0.05))
-
-
-def test_record_video_films_the_whole_replay_when_it_is_asked_to_render(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "moviepy", ModuleType("moviepy"))  # it is needed to write the film alone
-    made = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld", render_mode="rgb_array_list")
-    films = gymnasium.wrappers.RecordVideo(made, str(tmp_path / "films"), episode_trigger=lambda episode: True)
-    films.reset(seed=7)
-    films.step(np.zeros(films.action_space.shape))
-    assert len(films.recorded_frames) == 2
-    films.render()
-    assert len(films.recorded_frames) == 2 + len(made.render()) > 20
-    assert {frame.shape for frame in films.recorded_frames} == {(240, 320, 3)}
-    films.recorded_frames.clear()

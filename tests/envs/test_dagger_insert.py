@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.envs.dagger_insert import HISTORY, MIRRORS, SHAPES, VECTORS, DaggerInsert, forward, mirrored, wanted
+from apo_bench.envs.dagger_insert import MIRRORS, SHAPES, DaggerInsert, forward, mirrored, wanted
 from apo_bench.envs.policies import POLICIES
 from apo_bench.names import resolve
 from apo_bench.resources import folder
@@ -40,35 +40,6 @@ def test_in_a_mirror_it_does_the_same_in_the_mirror(signs: np.ndarray) -> None:
         a, b = here(None, seen), there(None, in_mirror(seen, signs))
         assert b[:6] == pytest.approx(signs * a[:6])
     assert np.abs(a[:6]).max() > 1e-3
-
-
-def test_a_mirror_keeps_what_a_force_on_a_lever_turns() -> None:
-    """A torque is the way to a force times the force, in a mirror too."""
-    way, force = RNG.normal(size=(2, 3))
-    for signs in MIRRORS:
-        assert np.cross(signs[:3] * way, signs[:3] * force) == pytest.approx(signs[3:] * np.cross(way, force))
-
-
-def test_it_remembers_so_many_sights_and_no_more() -> None:
-    sights = [sight() for _ in range(HISTORY + 3)]
-    once, later = DaggerInsert(WEIGHTS), DaggerInsert(WEIGHTS)
-    told = [once.told(seen) for seen in sights]
-    again = [later.told(seen) for seen in sights[3:]]
-    newest = (VECTORS - 6) // HISTORY
-    assert np.array_equal(told[-1][:-16], again[-1][:-16])
-    assert not np.array_equal(told[-2][:-16], again[-2][:-16])
-    assert all(each.shape == (SHAPES[0][0],) for each in told)
-    assert np.array_equal(told[0][:newest], told[0][newest : 2 * newest])
-    assert np.array_equal(told[5][newest : 2 * newest], told[4][:newest])
-
-
-def test_what_it_says_is_an_action_across_that_leaves_the_way_and_the_hand_to_the_approach() -> None:
-    loud = {name: 10 * each for name, each in WEIGHTS.items()}
-    for weights in (WEIGHTS, loud):
-        said = DaggerInsert(weights)(None, sight())
-        assert said.shape == (7,)
-        assert np.abs(said).max() <= 1.0
-        assert said[2] == said[6] == 0.0
 
 
 def test_it_goes_to_the_mean_place_that_the_network_said() -> None:

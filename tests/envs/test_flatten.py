@@ -24,14 +24,6 @@ def test_gymnasium_has_no_complaint(name: str) -> None:
         check_env(env, skip_render_check=True)
 
 
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_stable_baselines_has_no_complaint(name: str) -> None:
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        checker.check_env(apo_bench.Flatten(gymnasium.make(name, scenario="block_on_block", grasp="weld")))
-
-
 def test_a_flat_action_is_the_action_of_the_environment() -> None:
     plain: Any = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld").unwrapped
     flat = apo_bench.Flatten(plain)
@@ -40,19 +32,3 @@ def test_a_flat_action_is_the_action_of_the_environment() -> None:
     np.testing.assert_allclose(seen, entries, rtol=1e-6)
     action = np.linspace(-1.0, 1.0, 12, dtype=np.float32)
     np.testing.assert_allclose(flat._action(action), plain.action_space.high * action.reshape(2, 6), rtol=1e-6)
-
-
-def test_the_largest_number_of_a_discrete_act_counts() -> None:
-    track: Any = gymnasium.make("APOTrack-v0", scenario="block_on_block", grasp="weld", replay=False)
-    flat = apo_bench.Flatten(track)
-    assert flat.action_space.shape == (9,)
-    flat.reset(seed=3)
-    do, finish = np.eye(9, dtype=np.float32)[[0, 2]]
-    assert [flat.step(act)[2] for act in (do, do, finish)] == [False, False, True]
-
-
-def test_an_action_out_of_range_is_refused() -> None:
-    flat = apo_bench.Flatten(gymnasium.make("APOReplay-v0", scenario="block_on_block"))
-    flat.reset(seed=0)
-    with pytest.raises(apo_bench.InputError, match="12 numbers from -1 to 1"):
-        flat.step(np.full(12, 2.0, dtype=np.float32))

@@ -25,10 +25,3 @@ def test_the_teacher_goes_where_the_part_really_has_to_go() -> None:
 def test_a_robot_that_is_right_by_its_settings_gets_the_usual_error_of_the_environment() -> None:
     wrong = {error: insert_env(TrialConfig("block_on_block", robot_error=error)).spec for error in ("none", "tool:1")}
     assert [spec.kwargs["robot_error"] for spec in wrong.values() if spec] == ["hand_eye:0.5/0.1", "tool:1"]
-
-
-def test_what_is_carried_has_to_go_where_it_belongs_too() -> None:
-    """Two cubes on a stick go into two pockets: the stick is off by millimetres, not by the way from cube to cube."""
-    env = insert_env(TrialConfig("pocket_table", noise_mm=1.0, noise_deg=1.0))
-    env.reset(options={"trial": 0})
-    assert np.linalg.norm(env.off[:2]) < 5e-3

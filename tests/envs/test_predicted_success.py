@@ -10,7 +10,6 @@ from apo_bench import TrialConfig, run_trial
 from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import CorrectPoses
-from apo_bench.errors import InputError
 
 SCENARIO = "block_on_block"
 SEED = 2
@@ -35,10 +34,3 @@ def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypa
     _, reward, terminated, _, info = env.step(zeros(env))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "promise", "abstained")
     assert info["predicted_success"] < 1.0
-
-
-def test_a_probability_is_needed() -> None:
-    with pytest.raises(InputError, match=r"min predicted success must be a number from 0 to 1, got 1\.5"):
-        APOReplay(SCENARIO, min_predicted_success=1.5)
-    with pytest.raises(InputError, match="min_predicted_success of APOReplay must be a number, got True"):
-        APOReplay(SCENARIO, min_predicted_success=True)

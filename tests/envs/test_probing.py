@@ -9,7 +9,6 @@ from apo_bench import TrialConfig
 from apo_bench.envs import robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.corrected import CorrectPoses
-from apo_bench.errors import InputError
 from apo_bench.trial import run
 
 SCENARIO = "block_on_block"
@@ -38,39 +37,3 @@ def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.Mo
     np.testing.assert_array_equal(ours.slip, theirs.slip)
     for name in ("mean", "sigmas", "middle"):
         np.testing.assert_array_equal(getattr(ours.estimate, name), getattr(theirs.estimate, name))
-
-
-def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = []
-
-    def noted(*plain):  # type: ignore[no-untyped-def]
-        given.append((plain[4].probing, plain[4].spiral))
-        raise InterruptedError
-
-    monkeypatch.setattr(robot, "replay_and_judge", noted)
-    env = APOReplay(SCENARIO, ft_sensor="joint-torque", assumed_robot_error="unknown")
-    env.reset(seed=4)
-    with pytest.raises(InterruptedError):
-        env.step(np.zeros(env.action_space.shape, dtype=np.float32))
-    assert given == [(None, False)]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [("ft_sensor", "unknown force-torque sensor"), ("assumed_robot_error", "unknown assumed robot error")],
-)
-def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        APOReplay(SCENARIO, **{wrong: "glue"})  # type: ignore[arg-type]
-
-
-def test_whether_it_feels_is_true_or_false() -> None:
-    with pytest.raises(InputError, match="probe of APOReplay must be True or False, got 'no'"):
-        APOReplay(SCENARIO, probe="no")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="ft_sensor of APOReplay must be a text, got None"):
-        APOReplay(SCENARIO, ft_sensor=None)  # type: ignore[arg-type]
-
-
-def test_pads_that_do_not_close_square_nothing() -> None:
-    with pytest.raises(InputError, match=r"the grasp 'weld' was given for a method with .probe"):
-        APOReplay(SCENARIO, probe=True, grasp="weld")

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from apo_bench import InputError, Observation, Plan, load_scenario
 from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, correlate_first_order
-from apo_bench.formats.observation import read_stated
 from apo_bench.formats.observation_json import observation_form, read_json_observation
 from apo_bench.formats.plan_json import plan_form
 from apo_bench.geometry import pose
@@ -110,21 +109,6 @@ def test_files_speak_mm_degrees_and_count_from_one() -> None:
     assert np.diag(entry["covariance_mm_deg"]) == pytest.approx([1.0] * 3 + [4.0] * 3)
 
 
-def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
-    document = form()
-    del document["start"], document["gap_mm"], document["play_mm"]
-    for entry in document["operations"]:
-        del entry["covariance_mm_deg"], entry["seen"]
-        entry |= {"deviation_mm": 2.0, "deviation_deg": 0.5}
-    back = read(tmp_path, document)
-    assert np.diag(back.covariance[0]) == pytest.approx([4e-6] * 3 + [np.radians(0.5) ** 2] * 3)
-    assert back.observed.all()
-    assert (back.gap_m, back.play_m) == (SCENARIO.gap_mm * 1e-3, SCENARIO.clearance_mm * 1e-3)
-    np.testing.assert_array_equal(back.start["castle1"], SCENARIO.start["castle1"])
-    lowered = SCENARIO.start["stick"][2, 3] - back.start["stick"][2, 3]
-    assert lowered == pytest.approx(SCENARIO.clearance_mm * 1e-3)
-
-
 def test_shared_errors_come_back_and_may_be_left_out(tmp_path: Path) -> None:
     seen = with_shared(observation())
     back = read(tmp_path, form())
@@ -189,7 +173,6 @@ BROKEN = {
         _set("operations", 0, "covariance_mm_deg", to=(1e-9 * np.eye(6)).tolist()),
         "covariance_mm_deg: the square root of a variance is out of range",
     ),
-    "a part without a start": (_drop("start", "stick"), "'stick' is missing"),
 }
 
 
@@ -204,22 +187,3 @@ def test_a_broken_observation_is_refused_in_one_sentence(case: str, tmp_path: Pa
     assert words in message
     assert "\n" not in message
     assert message.endswith(".")
-
-
-def test_deviations_may_be_assumed(tmp_path: Path) -> None:
-    document = form()
-    del document["operations"][0]["covariance_mm_deg"]
-    second = document["operations"][2]
-    del second["covariance_mm_deg"]
-    second |= {"deviation_mm": 3.0, "deviation_deg": 0.25}
-    path = tmp_path / "some.json"
-    path.write_text(json.dumps(document), encoding="utf-8-sig")
-    seen, assumed = read_json_observation(path, SCENARIO, (2.0, 0.5))
-    assert assumed
-    found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
-    np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.25)]])
-    with pytest.raises(InputError, match="standard deviations are missing"):
-        read_stated(path, SCENARIO)
-    del second["deviation_deg"]
-    with pytest.raises(InputError, match="operation 3: state both"):
-        read(tmp_path, document)

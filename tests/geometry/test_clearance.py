@@ -14,14 +14,6 @@ from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.faces import SIDES, unite
 
 
-def sizes(name: str, clearance_m: float) -> dict[str, tuple[float, ...]]:
-    return {box.name: tuple(2e3 * box.half) for box in shrink_pieces(load_part(name), clearance_m)}
-
-
-def test_the_stick_gets_thinner_and_not_shorter():
-    assert sizes("stick", 0.00025)["bar"] == pytest.approx((220, 19.5, 19.5))
-
-
 @pytest.mark.parametrize("clearance_mm", [0.25])
 def test_a_pocket_is_wider_and_has_no_crack(clearance_mm: float):
     """The union of the physical boxes is again one solid with two plain pockets, as deep as before."""

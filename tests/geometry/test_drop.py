@@ -23,9 +23,3 @@ def test_a_cube_falls_until_its_lowest_corner_touches(height: float, turn: tuple
     T = pose.at((0.05, 0.03, 0.0), turn)
     T[2, 3] = 0.001 + height + 0.02 * np.abs(T[2, :3]).sum()
     assert measure_drop(CUBE, T, SLAB, np.eye(4)) == pytest.approx(height, abs=3 * TOUCH_M)
-
-
-@pytest.mark.parametrize("at", [(0.5, 0.0, 0.1), (0.42, 0.0, 0.1), (0.0, 0.0, -0.1)])
-def test_what_is_beside_or_below_is_passed_by(at: tuple[float, float, float]) -> None:
-    """Also a wall along which the cube slides down."""
-    assert measure_drop(CUBE, pose.at(at), SLAB, np.eye(4)) == np.inf

@@ -1,23 +1,11 @@
 """Parts of any pieces: after which turns they are the same, also after any turn about an axis."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import (
-    Box,
-    Face,
-    Hull,
-    Solid,
-    find_nearest_alike,
-    find_revolution,
-    find_symmetries,
-    make_turn,
-    pose,
-)
-from tests.round_contacts import MM, part, pin, plate, ring, tube, wall
+from apo_bench.geometry import Face, Hull, Solid, find_nearest_alike, find_revolution, find_symmetries, make_turn, pose
+from tests.round_contacts import MM, part, ring, tube, wall
 
 
 def prism(corners: np.ndarray, height: float, at: np.ndarray | None = None, fit: tuple[str, ...] = ()) -> Solid:
@@ -64,32 +52,6 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
         for g in found:
             apart = np.linalg.norm(pose.apply(g, spots)[:, None] - spots[None], axis=-1)
             assert apart.min(axis=1).max() < 1e-9
-
-
-@pytest.mark.parametrize("sides", [None, 16])
-def test_a_bush_is_the_same_after_any_turn_and_upside_down(sides):
-    found = find_revolution(bush(sides=sides))
-    assert found is not None
-    assert abs(found.axis[2]) == pytest.approx(1.0)
-    assert len(find_symmetries(bush(sides=sides))) == 2
-    assert find_revolution(pin()) is not None
-    assert len(find_symmetries(pin())) == 1
-    assert find_revolution(plate()) is None
-    assert len(find_symmetries(plate())) == 4
-
-
-def test_what_is_not_round_is_no_part_of_revolution():
-    """A flat that is stated, a block that no face states, a bore that is off the axis, an inertia that is not even."""
-    flat = Face("flat", np.array([[9, -4, 0], [9, 4, 0], [9, 4, 20], [9, -4, 20]]) * MM)
-    assert find_revolution(bush(flat)) is None
-    key = Box("key", np.array([12, 0, 10]) * MM, np.array([3, 2, 10]) * MM)
-    assert find_revolution(replace(bush(), pieces=(*bush().pieces, key))) is None
-    away = replace(bush().rounds["bore"], point=np.array([1 * MM, 0, 0]))
-    assert find_revolution(replace(bush(), rounds={**bush().rounds, "bore": away})) is None
-    assert find_revolution(replace(bush(), inertia=np.diag([1.0, 1.2, 2.0]))) is None
-    assert find_revolution(replace(bush(), inertia=np.diag([1.0, 1.0, 2.0]))) is not None
-    square = prism(regular(4), 20 * MM).pieces
-    assert find_revolution(replace(bush(), pieces=square, centroid=np.zeros(3), faces={})) is None
 
 
 @pytest.mark.parametrize("seed", range(3))

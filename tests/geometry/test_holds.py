@@ -69,11 +69,3 @@ def test_what_is_offered_is_held_and_the_air_beside_it_is_not(name: str):
             assert is_held(solid, hold.point, hold.across, up, OPENING_M)
     hold = find_holds(solid, up, OPENING_M)[0]
     assert not is_held(solid, hold.point + 0.2 * hold.across, hold.across, up, OPENING_M)
-
-
-def test_a_pinch_holds_the_uppermost_millimetres_and_leaves_what_is_below_free():
-    pin = build_solid("pin", make_shaft(3.5, 0, 11.5, "wall"))
-    up = np.array([0.0, 0.0, 1.0])
-    reach = [max(hold.point[2] for hold in find_holds(pin, up, OPENING_M, over)) - PAD_M[1] for over in (0.0, 0.0085)]
-    assert reach[0] < 0.003
-    assert 0.0085 < reach[1] <= 0.0101

@@ -9,17 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import (
-    SAGITTA_M,
     Box,
-    Cylinder,
     Hull,
     PosedPieces,
     RoundFace,
     Solid,
-    count_sides,
     find_separating_axes,
-    make_cylinder_hull,
-    measure_extent,
     measure_intrusion_depths,
     shrink_pieces,
 )
@@ -57,15 +52,6 @@ def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
     spans = overlap_intervals(PosedPieces((a,), T_a), way, PosedPieces((b,), T_b))
     same = overlap_intervals(PosedPieces((as_hull(a),), T_a), way, PosedPieces((as_hull(b),), T_b))
     assert same == pytest.approx(spans, abs=1e-9)
-
-
-def test_a_cylinder_is_as_wide_as_its_sagitta_allows():
-    hull = make_cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.02))
-    assert len(hull.corners) == 2 * count_sides(0.005)
-    for angle in np.linspace(0.0, 6.0, 50):
-        low, high = measure_extent((hull,), np.array([np.cos(angle), np.sin(angle), 0.0]))
-        assert 0.005 - SAGITTA_M <= high <= 0.005 + 1e-12
-        assert -0.005 - 1e-12 <= low <= -0.005 + SAGITTA_M
 
 
 def wedges(radius: float, n: int) -> tuple[Hull, ...]:

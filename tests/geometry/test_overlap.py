@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Array, Face, measure_face_area, pose
+from apo_bench.geometry import Array, Face, pose
 from apo_bench.geometry.covering import compute_overlap
 
 pytestmark = pytest.mark.numeric
@@ -66,16 +66,6 @@ def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face:
     if before and len(before.corners) == len(after.corners):
         gaps = np.linalg.norm(pose.apply(T, before.corners)[:, None] - after.corners[None], axis=-1).min(axis=0)
         assert gaps.max() < 1e-7
-
-
-@given(st.floats(-80, 80), st.floats(-80, 80))
-@settings(max_examples=30, deadline=None)
-def test_the_shadow_of_a_tilted_face_shrinks_with_the_cosine(rx: float, ry: float):
-    T = pose.at((0, 0, 0.01), (rx, ry, 0))
-    cosine = abs(T[2, 2])
-    assert compute_overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(
-        cosine * measure_face_area(U_SHAPE), abs=1e-12
-    )
 
 
 @given(flat_poses)

@@ -50,16 +50,3 @@ def test_random_pieces_are_as_deep_as_their_difference_says(seed: int):
     assert max(0.0, found) == pytest.approx(wanted, abs=1e-9)
     if abs(found) > 1e-7:
         assert (found > 0.0) == overlap(*corners)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_what_is_far_apart_may_be_left_out(seed: int):
-    rng = np.random.default_rng(seed)
-    a, b = (tuple(random_hull(rng) for _ in range(5)) for _ in range(2))
-    at = rng.uniform(-0.1, 0.1, (9, 3))
-    T = moved(rng, 0.05)
-    depths = measure_intrusion_depths(a, np.eye(3), at, b, T)
-    for apart in (0.0, 0.02):
-        np.testing.assert_array_equal(
-            measure_intrusion_depths(a, np.eye(3), at, b, T, apart), np.maximum(depths, -apart), strict=True
-        )

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Solid, find_least_turned, find_revolution, pose
 from tests import rounds
-
-
-def test_a_shaft_with_one_fit_end_is_not_the_same_end_for_end() -> None:
-    peg = rounds.peg()
-    fit = replace(peg, faces={**peg.faces, "end": replace(peg.faces["end"], fit=True)})
-    found = find_revolution(fit)
-    assert found is not None
-    assert not found.reversible
 
 
 @given(st.integers(0, 10**6), st.sampled_from([rounds.peg(), rounds.plug()]))

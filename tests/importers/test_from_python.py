@@ -40,11 +40,6 @@ def test_an_assembly_becomes_a_scenario_that_runs(drawn: Path, tmp_path: Path, m
         apo_bench.save_scenario(scenario, tmp_path / "copy")
 
 
-def test_each_solid_of_a_file_becomes_a_part(drawn: Path, tmp_path: Path) -> None:
-    files = apo_bench.import_part(drawn, tmp_path / "parts", unit="mm")
-    assert [(file.suffix, file.is_file()) for file in files] == [(".xml", True)] * 2
-
-
 def test_a_scenario_is_shown_assembled_and_at_its_start() -> None:
     finished, start = (apo_bench.show_scenario("block_on_block", finished=end) for end in (True, False))
     assert finished.shape == start.shape == (480, 640, 3)

@@ -117,14 +117,6 @@ def test_a_document_becomes_its_type(tmp_path: Path) -> None:
             "plan, operation 1, move: a text without control characters",
         ),
         (GOOD | {"operations": [STEP, STEP | {"goal": {}}]}, "plan, operation 2, goal: the key 'at_mm' is missing."),
-        (
-            GOOD | {"operations": [STEP | {"goal": {"at_mm": [1, 2]}}]},
-            "plan, operation 1, goal, at_mm: a list of length 3 is needed, [1, 2] was given.",
-        ),
-        (
-            GOOD | {"operations": [STEP | {"kind": "loose"}]},
-            'plan, operation 1, kind: "centred" or "contact" is needed, "loose" was given.',
-        ),
     ],
 )
 def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sentence: str) -> None:
@@ -134,10 +126,7 @@ def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sente
     assert str(refused.value).endswith(".")
 
 
-@pytest.mark.parametrize(
-    ("text", "syntax"),
-    [("a = = 1", "toml"), ("a = 1\na = 2", "toml"), ("{\n", "json"), ('{"a": NaN}', "json"), ("[" * 100_000, "json")],
-)
+@pytest.mark.parametrize(("text", "syntax"), [("a = = 1", "toml"), ("a = 1\na = 2", "toml")])
 def test_text_of_another_syntax_is_refused(text: str, syntax: Any) -> None:
     with pytest.raises(InputError, match=f"plan: this is not {syntax.upper()} ") as refused:
         parse_plain(text, "plan", syntax)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import stat
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -94,12 +93,3 @@ def test_a_link_that_is_made_meanwhile_is_replaced_itself(tmp_path: Path) -> Non
     assert not (tmp_path / "a.txt").is_symlink()
     assert (tmp_path / "a.txt").read_text() == "new"
     assert (tmp_path / "victim").read_text() == "mine"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="looks at permissions")
-def test_permissions_are_those_of_the_old_file(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    write_file(path, "one")
-    path.chmod(0o604)
-    write_file(path, "two")
-    assert stat.S_IMODE(path.stat().st_mode) == 0o604

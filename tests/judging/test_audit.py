@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import find_revolution, find_symmetries, pose
-from apo_bench.judging.finished import fixtures
 from tests import audited_more_rounds, audited_rounds, audited_wholes, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS
-from tests.audited_states import LOOSE, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
+from tests.audited_states import LOOSE, Loose, Seen
 from tests.audited_states import STATES as FLAT_STATES
 from tests.end_states import END, Edit, moved, shift, verdict
 
@@ -27,11 +26,6 @@ def test_a_person_says_the_same_unless_the_rule_says_otherwise(seen: Seen) -> No
 def test_a_person_says_nearly(seen: Loose) -> None:
     found = verdict(seen.scene(), seen.edits)
     assert (found.success, found.loose_success) == (False, seen.nearly)
-
-
-def test_a_part_whose_last_contact_another_part_broke_is_no_fixture() -> None:
-    found = {build: fixtures(build().assembly) for build in (kept, used_later, aligned_twice, stop_for_two)}
-    assert found == {kept: set(), used_later: set(), aligned_twice: {"D"}, stop_for_two: {"D"}}
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "subassembly_on_castles", "pockets"])

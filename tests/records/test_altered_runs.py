@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -36,10 +35,7 @@ def read(folder: Path) -> None:
     [
         ("trials.jsonl", '{"success": 1}', "line 1: Expected `bool | null`, got `int` - at `$.success`"),
         ("trials.jsonl", '{"noise_mm": null}', "line 1, field noise_mm: noise_mm and noise_deg and human_error_scale"),
-        ("trials.jsonl", '{"method": "a\\u001bb"}', "line 1, field method: control characters are not allowed"),
         ("trials.jsonl", '{"worst_gap_mm": 1e999}', "line 1: Number out of range"),
-        ("timing.jsonl", '{"trial_s": -1}', "line 1: Expected `float` >= 0.0 - at `$.trial_s`"),
-        ("run.json", '{"grids": [3]}', "Expected `object`, got `int`"),
     ],
 )
 def test_the_sentence_names_file_line_and_field(name: str, text: str, said: str, tmp_path: Path) -> None:
@@ -57,19 +53,3 @@ def test_the_sentence_names_file_line_and_field(name: str, text: str, said: str,
         read(folder)
     assert str(refused.value).startswith(str(folder / name))
     assert said in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"as_demonstrated": None}, "as_demonstrated and success are null together"),
-        ({"success": False, "failure_stage": "judge", "failure_code": "gap"}, "it is true, so success must be true"),
-    ],
-)
-def test_the_two_verdicts_go_together(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
-    (line, *_) = (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()
-    right = json.loads(line)
-    assert (right["success"], right["as_demonstrated"]) == (True, True)
-    (tmp_path / "trials.jsonl").write_text(f"{json.dumps(right | changed)}\n", encoding="utf-8")
-    with pytest.raises(InputError, match=f"line 1, field as_demonstrated: {said}"):
-        read_trials(tmp_path)

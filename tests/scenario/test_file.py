@@ -20,7 +20,6 @@ BRIDGE, FIXTURE, POCKETS, BLOCKS = (
     for name in ("carried_bridge", "vanished_fixture", "pocket_table", "block_on_block")
 )
 STICK_START = "start = { at_mm = [60, 290, 10] }"
-GOAL2 = "goal = { at_mm = [0, 0, 80], turn_deg = [180, 0, 0] }"
 GOAL3 = "goal = { at_mm = [0, 0, 40] }"
 BOTTOM = 'contacts = [["bottom", "table.top"]]'
 ON_TOP = 'contacts = [["topP", "castle1.topN"], ["topN", "castle1.topP"]]'
@@ -31,18 +30,15 @@ BROKEN = {
     "syntax": ("schema = 1", "schema = = 1", ["this is not TOML", "line 4"]),
     "another schema": ("schema = 1", "schema = 2", ["schema: 1 is needed, 2 was given"]),
     "an unknown key": ("clearance_mm = 0.25", "clearence_mm = 0.25", ["'clearence_mm'", "did you mean 'clearance_mm'"]),
-    "no start": (STICK_START, "", ["parts, stick", "'start' is missing"]),
     "far away": (GOAL3, "goal = { at_mm = [0, 0, 4e9] }", ["operation 3, goal, at_mm 3", "2000"]),
     "an unknown part file": ('file = "stick"', 'file = "stik"', ["parts, stick", "did you mean 'stick'"]),
     "a fixed part that moves": ('move = "castle1"', 'move = "table"', ["operation 1, move", "'table' is fixed"]),
     "an idle part": ("\n[site]", '\n[parts.cube]\nfile = "cube"\nstart = { at_mm = [0, 300, 25] }\n[site]', ["'cube'"]),
-    "an unknown face": ('["bottom", "table.top"]', '["botom", "table.top"]', ["contact 1", "face", "'bottom'"]),
     "a face of its own": (
         '["bottom", "table.top"]',
         '["bottom", "castle1.topP"]',
         ["'castle1' moves in this operation"],
     ),
-    "faces apart": (GOAL2, GOAL2.replace(" 80]", " 83.2]"), ["contacts, contact 1", "3.2 mm apart", "castle2.topP"]),
     "faces look away": (ON_TOP, 'contacts = [["bottom", "castle1.topN"]]', ["contact 1", "0 degrees apart", "180"]),
     "faces beside": (ON_TOP, 'contacts = [["topP", "castle1.topP"]]', ["contact 1", "do not overlap"]),
     "parts overlap": (
@@ -53,11 +49,6 @@ BROKEN = {
     "in the way of a site": ("spread_mm = [40, 60]", "spread_mm = [30, 240]", ["site", "when the site is at"]),
     "turned over": (", 40], turn_deg = [180, 0, 0] }\n", ", 0] }\n", ["operation 2, goal", "tilted by 180 degrees"]),
     "vary along what is fixed": (VARY2, VARY2.replace('"x"', '"z"'), ["operation 2, vary", "varied by -4 mm"]),
-    "careless upwards": (
-        'operation = 2\nalong = "y"',
-        'operation = 2\nalong = "z"',
-        ["human_error, along", "is level at the goal"],
-    ),
     "no axis": (
         'attach = { along = "+x"',
         'attach = { along = "xy"',
@@ -120,11 +111,7 @@ def test_what_the_tower_says():
     assert tower.assembly.fixed == {"table"}
     assert tower.goals[1] == pytest.approx(pose.at((0, 0, 0.08), (180, 0, 0)))
     assert tower.start["castle2"] == pytest.approx(pose.at((0.14, -0.29, 0.04), (180, 0, 0)))
-    assert (tower.human_error.operation, tower.human_error.low_m, tower.human_error.high_m) == (
-        1,
-        0.0015,
-        0.004,
-    )
+    assert (tower.human_error.operation, tower.human_error.low_m, tower.human_error.high_m) == (1, 0.0015, 0.004)
     assert tower.human_error.axis == pytest.approx((0, 1, 0))
     assert np.degrees(tower.site.yaw_rad) == pytest.approx((-28, 28))
     assert [(s.operation, s.low_m, s.high_m) for s in tower.shifts] == [(1, -0.004, 0.004), (2, -0.005, 0.005)]
@@ -169,85 +156,16 @@ def test_part_files_are_found_beside_the_scenario(tmp_path: Path):
     assert "parts, stick" in refused(path)
 
 
-SUB_ASSEMBLY = """
-schema = 1
-title = "A block on a bridge, moved together, then the block alone"
-
-[parts.table]
-file = "table"
-fixed = true
-
-[parts.stop]
-file = "block"
-fixed = true
-follows_site = true
-start = { at_mm = [-75, 0, 25] }
-
-[parts.bridge]
-file = "bridge"
-start = { at_mm = [0, -300, 10] }
-
-[parts.block]
-file = "block"
-start = { at_mm = [0, 300, 25] }
-
-[[operations]]
-move = "bridge"
-goal = { at_mm = [20, 100, 10] }
-contacts = [["nz", "table.top"]]
-
-[[operations]]
-move = "block"
-goal = { at_mm = [20, 100, 45] }
-contacts = [["nz", "bridge.pz"]]
-
-[[operations]]
-move = "bridge"
-carries = ["block"]
-goal = { at_mm = [0, 0, 10] }
-contacts = [["nz", "table.top"], ["nx", "stop.px"]]
-
-[[operations]]
-move = "block"
-goal = { at_mm = [-75, 0, 75] }
-contacts = [["nz", "stop.pz"]]
-vary = [{ along = "x", mm = [-5, 5] }, { along = "y", mm = [-5, 5] }]
-
-[site]
-center_mm = [50, 0]
-spread_mm = [20, 0]
-yaw_deg = [-20, 20]
-"""
-
-
-def test_carried_parts_second_moves_and_fixed_parts_that_follow(tmp_path: Path):
-    path = tmp_path / "group.toml"
-    path.write_text(SUB_ASSEMBLY)
-    group = load_scenario(path)
-    assert group.follows_site == {"stop"}
-    assert group.assembly.operations[2].moves == ("bridge", "block")
-    assert [shift.operation for shift in group.shifts] == [3, 3]
-    assert len(group.assembly.odls()[2]["block"]) == 3
-
-
 AWAY = 'goal = { at_mm = [70, 140, 25] }\ncontacts = [["nz", "table.top"]]\n'
 AGAIN = '\n[[operations]]\nmove = "cube"\ngoal = { at_mm = [70, 140, 25] }\ncontacts = [["nz", "table.top"]]\n'
 LEFT = '[[operations]]\nmove = "B"\ngoal = { at_mm = [200, 0, 25] }\ncontacts = [["nz", "table.top"]]\n\n[judge]'
 DISORDER = {
-    "of a group": (SUB_ASSEMBLY, "follows_site = true\n", "", ["operation 3, contacts, contact 2", "50 mm apart"]),
     "carried but never touched": (
         FIXTURE,
         AWAY,
         'carries = ["castle1"]\n' + AWAY,
         ["operation 4, carries", "'castle1' is carried, but no contact", "'cube'", "leave it out"],
     ),
-    "carried after the contact is gone": (
-        POCKETS,
-        'carries = ["cube2", "cube3"]',
-        'carries = ["cube2", "cube3", "cube1"]',
-        ["operation 6, carries", "'cube1' is carried, but no contact that stands"],
-    ),
-    "carried twice": (POCKETS, '["cube2", "cube3"]', '["cube2", "cube2"]', ["'cube2' is moved already"]),
     "left in the air": (BLOCKS, "[judge]", LEFT, ["operation 3, carries", "after it 'A' rests on nothing"]),
     "removed to where it is": (FIXTURE, AWAY, AWAY + AGAIN, ["operation 5, goal", "'cube' stands there already"]),
 }

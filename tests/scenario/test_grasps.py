@@ -67,10 +67,8 @@ def test_a_tilted_grasp_is_read(tmp_path: Path):
     ("keys", "words"),
     [
         (f"at_mm = [20, 0, 14], ahead = {LEANS}", "'across'"),
-        (f'at_mm = [20, 0, 14], across = "x", ahead = {LEANS}', "'across'"),
         ('at_mm = [20, 0, 14], across = "y", ahead = [1, 0, -0.9]', "within 45 degrees of straight down"),
         (f'at_mm = [90, 0, 14], across = "y", ahead = {LEANS}', "a point of the part"),
-        (f'across = "y", ahead = {LEANS}', "'at_mm' and an axis"),
     ],
 )
 def test_a_tilted_grasp_that_cannot_be_one_is_named(tmp_path: Path, keys: str, words: str):

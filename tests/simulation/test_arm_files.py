@@ -10,9 +10,6 @@ from apo_bench.resources import folder
 from apo_bench.simulation.arms.loading import compile_model, load_model
 
 ARMS = folder("assets") / "arms"
-WORLD = "<worldbody>"
-END = "</mujoco>"
-BALL = "<body><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>{}</body>"
 
 
 def with_gripper(folder: Path, arm: str) -> Path:
@@ -81,15 +78,3 @@ def test_meshes_are_found_where_the_compiler_says(tmp_path: Path) -> None:
     (mesh,) = load_model(tmp_path / "arm.xml", "arm").meshes
     assert mesh.file == str(tmp_path / "assets" / "a.stl")
     assert list_named_files(tmp_path / "arm.xml") == (tmp_path / "arm.xml", tmp_path / "assets" / "a.stl")
-
-
-def test_a_mesh_that_is_stated_twice_is_read_once_as_robosuite_does(tmp_path: Path) -> None:
-    (tmp_path / "link.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
-    (tmp_path / "arm.xml").write_text(
-        '<mujoco><default><default class="a" group="1"/></default>'
-        '<asset><mesh file="link.obj"/><mesh file="link.obj" scale="2 2 2"/></asset>'
-        '<worldbody><body><geom type="mesh" mesh="link"/></body></worldbody></mujoco>'
-    )
-    model = compile_model(load_model(tmp_path / "arm.xml", "arm"), tmp_path)
-    assert model.nmesh == 1
-    assert model.mesh_vert.max() < 1.0

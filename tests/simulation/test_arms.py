@@ -1,7 +1,6 @@
 """Arms that are described by a file: kinematics, drives and grippers are what the file and the model say."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -15,8 +14,7 @@ from apo_bench.resources import folder
 from apo_bench.simulation.arm_checks.arm_check import check_arm
 from apo_bench.simulation.arms import finding
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.simulation.arms.gripper_file import read_gripper
-from apo_bench.simulation.arms.home import tip_down, with_home
+from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.reach import follow_waypoints, plan_waypoints
 from apo_bench.viz.arm_text import arm_check_form
@@ -68,19 +66,6 @@ def test_the_primitive_arms_have_the_published_kinematics() -> None:
     np.testing.assert_allclose(flange("panda_primitive", q), expected @ by(z=0.107), atol=1e-8)
 
 
-def test_a_linkage_opens_as_its_geometry_says() -> None:
-    """Half of 85 mm: 30.6 + 57.1 sin(41.2 degrees - q) - 25.4 mm; the command is the angle of its drivers."""
-    hand = find_arm("ur5e_primitive").hand
-    assert hand is not None
-    length = np.hypot(37.6, 43.0)
-    angle = np.arctan2(37.6, 43.0)
-    expected = 30.6 + length * np.sin(angle - hand.commands[:, 0]) - 25.4
-    np.testing.assert_allclose(1e3 * hand.opening, expected, atol=0.1)
-    assert hand.graded
-    for opening in (0.005, 0.02, 0.04):
-        assert hand.of_command(hand.command(opening)) == pytest.approx(opening, abs=1e-9)
-
-
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) -> None:
     arm = find_arm(name)
@@ -105,7 +90,6 @@ def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: st
 
 
 GOOD = 'schema = "apo-bench/arm/1"\nmjcf = "ARMS/ur5e_primitive.xml"\n'
-HOME = "base = { at_mm = [-480, 0, 0] }\nhome_deg = [18, -79, -105, -86, 90, -72]\n"
 GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\nhand = "linkage_gripper"\n'
 
 
@@ -113,16 +97,9 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\nhand = "linkage_gripper
     ("text", "words"),
     [
         (GOOD + "joint = 1", r"unknown key 'joint' \(did you mean 'joints'"),
-        (GOOD + GRIPPER + "speed_mm_s = 0", "gripper, speed_mm_s: a number > 0"),
-        (
-            GOOD + '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"',
-            "what the gripper does is not stated; name its gripper file",
-        ),
         (GOOD + GRIPPER.replace('"linkage_gripper"', '"linkage"'), "unknown gripper 'linkage'; known are franka_hand"),
         (GOOD + GRIPPER.replace('"linkage_gripper"', '"franka_hand"'), "unknown body 'gripper/hand'"),
-        ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"\n' + GRIPPER, "the model file of the arm is missing"),
         (GOOD + 'flange = "flnge"\n' + GRIPPER, "unknown flange 'flnge'; did you mean 'flange'"),
-        (GOOD + "home_deg = [1, 2]\n" + GRIPPER, "'home_deg' has 2 numbers; the arm has 6 joints"),
         (GOOD, "the key 'gripper' is missing"),
     ],
 )
@@ -186,15 +163,6 @@ def test_an_arm_goes_around_its_base_where_the_straight_line_passes_over_it() ->
     assert len(plan_waypoints(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
 
 
-def test_an_arm_that_is_short_stands_nearer_unless_its_base_is_stated() -> None:
-    far = replace(find_arm("ur5e_primitive"), base=(-1.9, 0.0, 0.0))
-    nearer = with_home(far, base_is_stated=False)
-    assert nearer.base[0] >= -0.4
-    np.testing.assert_allclose(Kinematics(nearer).forward(nearer.home)[:3, 3], (-0.05, 0.0, 0.3), atol=1e-5)
-    with pytest.raises(InputError, match="the tip does not reach"):
-        with_home(far, base_is_stated=True)
-
-
 def test_an_arm_of_five_joints_looks_down_and_leans_where_it_cannot(tmp_path: Path) -> None:
     """Waist, three pitches and a roll: straight down at any turn; tilted across its plane by 1 degree, not by 5."""
     link = '<body pos="{0}"><joint name="j{1}" axis="{2}" range="-3 3"/><geom size="0.02"/>'
@@ -250,25 +218,9 @@ def stated(folder: Path, *changes: tuple[str, str], model: Path = ARMS / "six_ax
     return path
 
 
-def test_the_usual_arm_is_what_its_file_states() -> None:
-    """To the last bit: its recorded verdicts hang on them."""
-    arm = find_arm("six_axis")
-    assert arm.home.tolist() == [0.0, 0.2, 0.9, 0.0, 0.47, 0.0]
-    assert (arm.base, arm.turn) == ((-0.42, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    assert arm.joints == ("j1", "j2", "j3", "j4", "j5", "j6")
-    assert (arm.tip, arm.fingers, arm.grip, arm.mount) == ("tip", ("left_finger", "right_finger"), "grip", "gripper")
-    assert (arm.opening_m, arm.hand, arm.control) == (0.046, None, "own position actuators")
-    assert [path.name for path in arm.files] == ["six_axis.toml", "six_axis.xml"]
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ([("opening_mm = 46\n", "")], "'tip', 'slides', 'opening_mm' and 'actuators' are given together"),
-        (
-            [("opening_mm = 46", "opening_mm = 46\nhand = 'franka_hand'")],
-            "'slides' are stated is part of the arm; leave 'hand' and 'mjcf' out",
-        ),
         ([('"right_finger"', '"j1"')], "unknown slide 'j1'"),
         ([("[0, 11, 52, 0, 27, 0]", "[0, 11, 52]")], "'home_deg' needs 6 numbers"),
     ],
@@ -276,19 +228,3 @@ def test_the_usual_arm_is_what_its_file_states() -> None:
 def test_an_error_in_a_stated_gripper_is_refused(tmp_path: Path, changes: list[tuple[str, str]], words: str) -> None:
     with pytest.raises(InputError, match=re.escape(words)):
         read_arm(stated(tmp_path, *changes))
-
-
-@pytest.mark.parametrize("path", sorted((folder("assets") / "grippers").glob("*.toml")), ids=lambda path: path.stem)
-def test_a_gripper_file_opens_as_it_is_commanded(path: Path) -> None:
-    table = read_gripper(path)
-    hand = table.hand("", table.pads)
-    for opening in hand.opening[[0, len(hand.opening) // 2, -1]]:
-        assert hand.of_command(hand.command(opening)) == pytest.approx(opening, abs=2e-3)
-    assert np.linalg.det(table.tip_frame(path)[:3, :3]) == pytest.approx(1.0)
-
-
-def test_a_gripper_file_whose_rows_do_not_fit_is_refused(tmp_path: Path) -> None:
-    text = (folder("assets") / "grippers" / "parallel_gripper.toml").read_text().replace("  [-0.03],\n", "")
-    (tmp_path / "mine.toml").write_text(text)
-    with pytest.raises(InputError, match="'commands' needs 11 rows of 1 numbers"):
-        read_gripper(tmp_path / "mine.toml")

@@ -5,20 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, Scene, build_scene, load_scenario, replay
+from apo_bench import Plan, Scene, build_scene, load_scenario, replay
 from apo_bench.assembly import Operation, Poses, Step, compute_placements
 from apo_bench.geometry import Array, Box, measure_intrusion_depths, pose
 from apo_bench.scenario.layout import place_layout
 from apo_bench.scenario.parts.making import Body, extrude, make_polygon, make_rectangle
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.grasping import (
-    RestingPart,
-    clear_across,
-    grasp_at,
-    half_width,
-    list_obstacles,
-)
+from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, half_width, list_obstacles
 from apo_bench.simulation.execution.prepare import Move, plan_moves
 from apo_bench.simulation.execution.transfer import is_tilted
 from apo_bench.simulation.robot.gripper import list_gripper_boxes
@@ -118,17 +112,6 @@ def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path
     assert half_width(scene.pieces["part"], grasp, T) == pytest.approx(0.005)
 
 
-def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path: Path) -> None:
-    scene = one_part(tmp_path, bracket(), SIDEWAYS)
-    T = scene.scenario.start["part"]
-    around = list_obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
-    for half, clear in ((0.005, False), (0.002, True)):
-        size = np.array([half, 0.01, 0.02])
-        walls = [Box(f"wall{side}", np.array([0.005, side * 0.0205, 0.02]), size) for side in (-1, 1)]
-        grasp = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, make_obstacle(tuple(walls), T))))
-        assert (grasp is not None) == clear
-
-
 def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
     ahead = np.array([-0.5, 0.0, -np.sqrt(0.75)])
     bar = extrude(make_rectangle(60, 20), 0, 40, bottom="bottom")
@@ -144,24 +127,3 @@ def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
         Plan(scene.scenario.assembly, layout.start, layout.poses), scene, config=ExecutionConfig("near-contact")
     )
     assert result.outcome.code == "ok"
-
-
-@pytest.mark.parametrize(
-    ("width", "density", "words"),
-    [(80, 20000.0, "operation 1 lifts .* kg; the friction of the pads holds 2.45 kg"), (100, 1000.0, "spans 100 mm")],
-)
-def test_what_cannot_be_held_is_named_before_anything_moves(
-    tmp_path: Path, width: float, density: float, words: str
-) -> None:
-    with pytest.raises(InputError, match=words):
-        one_part(tmp_path, extrude(make_rectangle(120, width), 0, 60, bottom="bottom"), SIDEWAYS, density)
-
-
-def test_a_part_that_is_too_smooth_is_named_and_one_that_is_not_slips_no_more_than_others(tmp_path: Path) -> None:
-    cube = extrude(make_rectangle(60, 40), 0, 40, bottom="bottom")
-    with pytest.raises(InputError, match=r"'part', which is too smooth: with its friction of 0\.02 the gripper holds"):
-        one_part(tmp_path, cube, SIDEWAYS, friction=0.02)
-    scene = one_part(tmp_path, cube, SIDEWAYS, friction=0.2)
-    layout = place_layout(scene.scenario, 0.1, 0.0, 0.2)
-    (moved,) = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene).in_hand
-    assert moved.moved_m < 1e-3

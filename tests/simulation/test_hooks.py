@@ -10,7 +10,7 @@ from apo_bench import Layout, Plan, Scene, build_scene, demonstrate, draw_layout
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase, as_hooks
+from apo_bench.simulation.hooks import BY_HAND, Hooks, Phase
 
 
 class Calls:
@@ -79,17 +79,3 @@ def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
     aside = {**layout.start, first: pose.at((0.0, 0.04, 0.0)) @ layout.start[first]}
     assert replay(plan, scene, calls.hooks, parts_at=aside, config=ExecutionConfig("near-contact")).outcome.code != "ok"
     assert calls.order == [("replay", plan), ("tick", None), ("before", Step(0)), ("tick", 0)]
-
-
-def test_a_function_of_the_state_is_a_hook_too() -> None:
-    seen = []
-
-    def look(data: Any) -> None:
-        seen.append(data)
-
-    hooks = as_hooks(look)
-    assert hooks.after_tick is not None
-    hooks.after_tick("state", Phase(0, "pick", 1.0))
-    assert seen == ["state"]
-    assert as_hooks(hooks) is hooks
-    assert as_hooks(None).after_tick is None

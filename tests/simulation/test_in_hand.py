@@ -9,7 +9,6 @@ from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.simulation.robot.in_hand import SLIPS_M, Carried, hold_steady
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.slip_monitor import GraspSlipMonitor
 from apo_bench.simulation.scene.world import get_part_pose, make_initial_state, set_part_pose
 from tests.round_scenes import peg_in_hole
 
@@ -73,15 +72,3 @@ def test_a_group_is_put_back_as_one_and_what_touches_is_not_moved() -> None:
         now = pose.inverse(get_part_pose(world, data, "stick")) @ get_part_pose(world, data, "castle1")
         np.testing.assert_allclose(now, between, atol=1e-9)
         assert (data.qvel == 0.5).all()
-
-
-GRASPED = pose.at((0.01, 0.02, 0.03), (0.0, 90.0, 20.0))
-"""A part in the frame of the tip."""
-
-
-def test_a_shaft_that_rolls_between_the_pads_turns_about_the_point_between_them_and_slides_nowhere():
-    rolled = pose.at((0.0, 0.0, 0.0), (30.0, 0.0, 0.0)) @ GRASPED
-    (moved,) = GraspSlipMonitor().grasp(GRASPED).carry(GRASPED).release(rolled).finish(2).finished
-    assert (moved.operation, moved.carried_m, moved.carried_rad) == (2, 0.0, pytest.approx(0.0, abs=1e-7))
-    assert moved.moved_m == pytest.approx(0.0, abs=1e-12)
-    assert moved.moved_rad == pytest.approx(np.radians(30.0))

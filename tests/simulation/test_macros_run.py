@@ -16,7 +16,6 @@ CUBE = (Path(__file__).parents[2] / "assets" / "parts" / "cube.xml").read_text(e
 BOTTOM = '<geom name="end" pos="0.0225 0 0" size="0.0025 0.01 0.01"/><site name="bottom" pos="0.02 0 0"/>'
 SITE = "[site]\ncenter_mm = [80, 0]\nspread_mm = [10, 10]\nyaw_deg = [-20, 20]\n"
 HOLE = '["py", "{0}.hpy"], ["ny", "{0}.hny"], ["pz", "{0}.hpz"], ["nz", "{0}.hnz"]'
-SLOT = '["py", "castle.spy"], ["ny", "castle.sny"], ["nz", "castle.sfl"]'
 
 
 def own(folder: Path, *operations: str, **parts: tuple[str, tuple[float, float, float]]) -> Scenario:
@@ -59,14 +58,6 @@ def test_a_bottom_is_found_by_force(tmp_path: Path, short_mm: float) -> None:
     assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
 
 
-def test_a_slot_may_be_entered_from_its_end(tmp_path: Path) -> None:
-    goal = f'goal = {{ at_mm = [0, 0, 40] }}\ncontacts = [{SLOT}]\nattach = {{ along = "-x" }}'
-    scenario = own(tmp_path, goal, castle=("castle", (0, 0, 0)))
-    assert names(scenario) == [["insert-into-slot", "move-to-contact"]]
-    assert scenario.attach[0].direction.tolist() == [-1.0, 0.0, 0.0]
-    assert done(scenario).verdict.as_demonstrated
-
-
 def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
     """Pulled out, put on the table, put back into the hole, pulled out once more: macros reversed and repeated."""
     scenario = own(
@@ -98,8 +89,4 @@ def test_a_corner_is_found_by_force_from_both_sides(tmp_path: Path) -> None:
     assert tried.result.outcome.code == "ok"
     assert [
         c.contact.environment.part for c in tried.verdict.demonstrated.contacts if c.operation == 0 and c.strict
-    ] == [
-        "left",
-        "back",
-        "table",
-    ]
+    ] == ["left", "back", "table"]

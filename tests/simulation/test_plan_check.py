@@ -7,8 +7,6 @@ from apo_bench import Plan, build_scene, draw_layout, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
-from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.execution.prepare import in_reach
 
 
 def test_a_panda_that_cannot_hold_its_tolerance_is_predicted_to_fail() -> None:
@@ -35,16 +33,3 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_predicted_to_fail() -> None:
     first = arm_moves(Plan(scenario.assembly, raised, plan.target_poses), scene)[0]
     assert first.struck == "table"
     assert first.struck_mm > 1.0
-
-
-def test_joint_angles_of_the_plan_check_are_reused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether a plan is in reach is known once it was foretold, also where it is not."""
-    scene = build_scene(load_scenario("block_on_block"))
-    layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
-    near = Plan(scene.scenario.assembly, layout.start, layout.poses)
-    far = Plan(scene.scenario.assembly, layout.start, pose.at((0.9, 0.0, 0.0)) @ layout.poses)
-    foretold = [[move.refused for move in arm_moves(plan, scene, False)] for plan in (near, far)]
-    assert foretold == [[None, None], ["unreachable", "unreachable"]]
-    monkeypatch.setattr(Kinematics, "inverse", lambda *_, **__: pytest.fail("looked for again"))
-    assert in_reach(near, scene)
-    assert not in_reach(far, scene)

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from apo_bench import Plan, Scene, build_scene, demonstrate, draw_layout, replay
+from apo_bench import Scene, build_scene
 from apo_bench.assembly import Operation
 from apo_bench.geometry import SAGITTA_M, Hull, Piece, pose, shrink_pieces
 from apo_bench.scenario.parts.making import build_solid, make_shaft
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, get_part_pose, make_initial_state, set_part_pose
 from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario
@@ -119,30 +118,3 @@ def test_a_peg_stands_on_its_end_and_one_that_lies_stays(scene: Scene):
         assert np.abs(off[:3, :3] - np.eye(3)).max() < 2e-3
         v = scene.shown.dof["peg"]
         assert np.abs(data.qvel[v : v + 3]).max() < 1e-4
-
-
-def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, monkeypatch: pytest.MonkeyPatch):
-    rng = np.random.default_rng(0)
-    layout = draw_layout(scene.scenario, rng)
-    demonstration = demonstrate(scene, layout, 0.0, rng)
-    assert demonstration.why == ""
-    assert demonstration.poses == pytest.approx(layout.poses, abs=5e-5)
-    held: list[np.ndarray] = []
-    steady = Robot.steady
-
-    def look(robot: Robot, on: bool) -> None:
-        tip = robot.tip()
-        held.append(pose.inverse(tip) @ get_part_pose(scene.work, robot.data, robot.forces.held[0]))
-        steady(robot, on)
-
-    monkeypatch.setattr(Robot, "steady", look)
-    result = replay(Plan(scene.scenario.assembly, layout.start, layout.poses), scene)
-    assert result.outcome.code == "ok"
-    final = result.reached.final
-    assert final is not None
-    inside = pose.inverse(final.poses["plate"]) @ final.poses["peg"]
-    assert np.hypot(*inside[:2, 3]) < 0.26e-3
-    assert inside[:3, 2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
-    assert inside[2, 3] == pytest.approx(0.025, abs=1e-5)
-    lifted, brought = held[-2:]
-    assert np.linalg.norm((brought - lifted)[:3, 3]) < 2e-5  # see test_in_hand.py

@@ -2,21 +2,17 @@
 
 import json
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.geometry import pose
-from apo_bench.simulation.execution import ExecutionConfig, search
+from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.execution.search import RADIUS_M, press_in
+from apo_bench.simulation.execution.search import RADIUS_M
 from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
-from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.robot.paths import plan_steady_trajectory, translate
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001
@@ -73,14 +69,6 @@ def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
         assert again.result.reached.final.poses[part].tobytes() == T.tobytes()
 
 
-def test_what_is_farther_off_than_the_spiral_is_not_found():
-    plan = aside("stick_in_tower", 5.0)
-    attempt = carried_out(plan, "stick_in_tower", True)
-    assert (attempt.result.outcome.stage, attempt.result.outcome.code) == ("attach", "force_stop")
-    assert not attempt.verdict.success
-    assert attempt.result.sim_time_s < carried_out(plan, "stick_in_tower", False).result.sim_time_s + 30.0
-
-
 def row(method, level, cache=None):
     spec = TrialConfig(
         "stick_in_tower", level, level, human_error_scale=0.0, method=method, seed=1, fidelity="near-contact"
@@ -123,19 +111,3 @@ def test_a_spiral_covers_every_place(direction):
         place *= (RADIUS_M - PITCH_M) * np.sqrt(rng.random()) / np.linalg.norm(place)
         assert np.linalg.norm(flat - place, axis=1).min() < 0.55 * PITCH_M, "half the pitch, and a tenth for its steps"
     assert np.linalg.norm(flat, axis=1).max() < RADIUS_M + PITCH_M
-
-
-def test_two_searches_in_one_motion_bring_every_pose_to_where_the_second_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A turn and a shift do not commute: what is returned takes the end of the line to where the tip then goes."""
-    first = pose.at((0.001, 0.0, 0.0), (0.0, 0.0, 2.0))
-    second = pose.at((0.0, 0.001, 0.0), (0.0, 0.0, -1.0))
-    steps = iter([first, second, None])
-    monkeypatch.setattr(search, "search_hole", lambda *_: next(steps))
-    monkeypatch.setattr(search, "_ease_in", lambda *_: np.zeros(3))
-    end = pose.at((0.0, 0.0, 0.1))
-    stopped = translate(end, DOWN, -0.01)
-    robot = SimpleNamespace(T=stopped, macro="insert-into", follow=lambda line, guard: 0.01)
-    grip = Grip(np.eye(4), 0.01)
-    transfer = SimpleNamespace(front=np.zeros(3), slide_n=1.0)
-    _, T_search = press_in(robot, transfer, grip, plan_steady_trajectory(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
-    assert T_search == pytest.approx(second @ first)

@@ -14,8 +14,7 @@ from apo_bench.simulation.robot.by_wrist import comply, get_wrist, press, read_w
 from apo_bench.simulation.robot.gripper import list_gripper_boxes
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import plan_steady_trajectory, smooth_trajectory, translate
-from apo_bench.simulation.robot.robot import ExecutionAborted, Robot
-from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import READING_S, WristSensor, compute_part_loads
 from apo_bench.simulation.scene.world import allow_sleep, get_part_pose, set_part_pose
 
@@ -104,7 +103,7 @@ def test_in_free_air_a_held_part_exerts_no_wrench(grasp: str, along: float) -> N
     assert mean_wrench(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
 
 
-@pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False), ("panda_primitive", True)])
+@pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False)])
 def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with allow_sleep(scene.work, asleep):
@@ -134,7 +133,7 @@ class Pushing:
         return None if self.left < 0 else np.array([0.0, 0.0, self.z, 0.0, 0.0, 0.0])
 
 
-@pytest.mark.parametrize(("arm", "newton"), [("six_axis", 2.0), ("ur5e_primitive", 5.0), ("panda_primitive", 2.0)])
+@pytest.mark.parametrize(("arm", "newton"), [("six_axis", 2.0), ("panda_primitive", 2.0)])
 def test_the_wrench_of_a_push_is_that_of_its_contacts(arm: str, newton: float) -> None:
     """Force and torque about the tip, against the contact sensor and the sum over all contacts, within 5 mN, 1 mNm."""
     scene = scene_of(arm)
@@ -164,65 +163,3 @@ def by_contacts(robot: Robot, about: Array) -> Array:
             f, t = force.reshape(2, 3) @ contact.frame.reshape(3, 3) * (1.0 if arm[1] else -1.0)
             total += np.concatenate([f, np.cross(contact.pos - about, f) + t])
     return total
-
-
-class Levelling(Pushing):
-    """As that, turning about level axes as the torque asks: a part pressed at its edge comes to lie flat."""
-
-    def __init__(self, newton: float, seconds: float) -> None:
-        super().__init__(newton, seconds)
-        self.turn: Array = np.zeros(2)
-
-    def __call__(self, wrench: Array) -> Array | None:
-        offset = super().__call__(wrench)
-        if offset is None:
-            return None
-        if wrench[2] > self.newton / 4:
-            self.turn = self.turn + READING_S * np.clip(0.06 * wrench[3:5], -0.05, 0.05)
-        offset[3:5] = self.turn
-        return offset
-
-
-@pytest.mark.parametrize(
-    ("grasp", "along", "tilt_deg"), [("friction", 0.0, 1.0), ("friction", 0.04, -1.0), ("weld", 0.04, 1.0)]
-)
-def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, along: float, tilt_deg: float) -> None:
-    """To within 0.01 degrees along the stick of 220 mm, behind noise of 0.1 N and 5 mNm."""
-    robot, wrist, _ = with_stick(grasp, "wrist", along, 0.004)
-    at = pose.at(robot.T[:3, 3])
-    robot.go(at @ pose.at((0, 0, 0), (0, tilt_deg, 0)) @ pose.inverse(at) @ robot.T, 0.1)
-    pitch = [np.degrees(np.arcsin(get_part_pose(robot.scene.work, robot.data, "stick")[2, 0]))]
-    law = Levelling(3.0, 6.0)
-    comply(robot, law, robot.T[:3, 3], wrist)
-    pitch.append(np.degrees(np.arcsin(get_part_pose(robot.scene.work, robot.data, "stick")[2, 0])))
-    assert pitch[0] == pytest.approx(-tilt_deg, abs=0.01)
-    assert abs(pitch[1]) < 0.01
-    first = next(wrench for wrench in law.wrenches if wrench[2] > 1.0)
-    # Tilted about y by a positive angle, the end ahead in x is lower and is pushed up: a negative torque about y.
-    assert np.sign(first[4]) == -np.sign(tilt_deg)
-
-
-def test_an_unreachable_motion_aborts() -> None:
-    robot, wrist = empty_hand(scene_of(), "ideal", 0.1)
-    far = iter(range(1, 10_000))
-    with pytest.raises(ExecutionAborted, match="unreachable"):
-        comply(robot, lambda _: np.array([0.0004 * next(far), 0, 0, 0, 0, 0]), robot.T[:3, 3], wrist)
-    assert (robot.wrist, robot.fidelity) == (None, "full")
-
-
-def test_joint_errors_turn_the_weight_that_is_subtracted() -> None:
-    """The robot knows its encoders, not its joints, so a part of the hand's 8.83 N remains once it is turned."""
-    scene = scene_of()
-    off = np.radians([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
-    robot = Robot(scene, scene.scenario.start, error=RobotError(np.eye(4), off, np.eye(4), np.eye(4)[None]))
-    wrist = get_wrist(robot, "ideal", np.random.default_rng(1))
-    zero(robot, wrist)
-    assert robot.encoders() == pytest.approx(robot.q, abs=1e-4)
-    assert np.abs(mean_wrench(robot, wrist, robot.T[:3, 3])[:3]).max() < 0.01
-    about = pose.at(robot.T[:3, 3])
-    robot.go(about @ pose.at((0, 0, 0), (0, -25, 0)) @ pose.inverse(about) @ robot.T, 0.4)
-    robot.stand(0.3)
-    # Zeroing took 8.83 N turned by a degree, less 8.83 N, for an offset; turned on by 25 degrees it is none.
-    error_n = 8.829 * 2 * np.sin(np.radians(0.5))
-    left = np.linalg.norm(mean_wrench(robot, wrist, robot.T[:3, 3])[:3])
-    assert left == pytest.approx(error_n * 2 * np.sin(np.radians(12.5)), rel=0.02)

@@ -82,13 +82,6 @@ def test_a_replay_that_becomes_unstable_is_a_failure_with_its_code(change: Calla
     assert run_trial(SETTINGS, scene(), simulated=simulated()) == before
 
 
-def test_an_error_of_mujoco_ends_a_replay_as_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
-    prepared = simulated()
-    monkeypatch.setattr(mujoco, "mj_step", fail)
-    row = run_trial(SETTINGS, scene(), simulated=prepared)
-    assert (row["failure_stage"], row["failure_code"]) == ("pick", "unstable_simulation")
-
-
 @pytest.mark.parametrize("change", [hurl, lose, fail])
 def test_a_demonstration_that_becomes_unstable_has_failed(
     change: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch

@@ -47,23 +47,6 @@ def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_
         assert np.corrcoef(felt[:-k, 0], felt[k:, 0])[0, 1] == pytest.approx(part**k, abs=0.03)
 
 
-@pytest.mark.parametrize("step_s", [0.0005, 0.0001])
-def test_readings_do_not_depend_on_the_step(tower: Scene, step_s: float) -> None:
-    """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
-    felt = []
-    for step in (0.001, step_s):
-        made = wrist(tower, FtNoise(0.1, 0.005))
-        per_ms = round(0.001 / step)
-        before = shown(made, 20 * per_ms, step)
-        made.signal[2] = 0.03 / step
-        blow = shown(made, 1, step)
-        made.signal[2] = 0.0
-        after = shown(made, 50 * per_ms - (1 if per_ms > 1 else 0), step)
-        felt.append(np.concatenate([before, blow.reshape(-1, 6), after])[:70])
-    assert len(felt[0]) == len(felt[1])
-    assert felt[1] == pytest.approx(felt[0], abs=1e-9)
-
-
 def test_the_offset_of_a_trial_is_drawn_and_zeroing_removes_it(tower: Scene) -> None:
     offsets = []
     for seed in range(200):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import apo_bench
 
@@ -29,19 +28,3 @@ def test_the_verbs_by_hand_give_the_row_of_the_trial(tower: apo_bench.Scene) -> 
     )
     assert (result.sim_time_s, result.peak_force_n) == (row["sim_time_s"], row["peak_force_n"])
     assert 1e3 * correction.gap_after_m == row["gap_after_mm"]
-
-
-def test_what_was_observed_is_replayed_as_it_is_unless_an_operation_was_not_seen(tower: apo_bench.Scene) -> None:
-    scenario = tower.scenario
-    seen = apo_bench.Observation(
-        scenario.assembly, scenario.start, scenario.goals, np.tile(1e-6 * np.eye(6), (3, 1, 1)), np.ones(3, dtype=bool)
-    )
-    np.testing.assert_array_equal(seen.plan().target_poses, scenario.goals)
-    missed = apo_bench.Observation(
-        seen.assembly, seen.start, seen.poses, seen.covariance, np.array([True, False, True])
-    )
-    with pytest.raises(apo_bench.InputError, match="operation 2 was not seen"):
-        missed.plan()
-    refused = apo_bench.correct(missed, "contact")
-    with pytest.raises(apo_bench.InputError, match=r"ended as not_seen .* which no robot should carry out"):
-        refused.plan(missed)

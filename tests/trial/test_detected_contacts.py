@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import Any
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.benchmark.analysis import ALL, tabulate_detection
-from apo_bench.benchmark.report.tables.methods import detection_table
+from apo_bench.benchmark.analysis import tabulate_detection
 from apo_bench.cli import app as cli
 from apo_bench.records import DETECTED
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
@@ -60,67 +58,14 @@ def test_a_trial_says_how_many_contacts_were_recognised(
     assert (made["contact_source"], made["wrong_contact"]) == (contact_source, None)
 
 
-def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: SimulatedDemonstration) -> None:
-    made = run_trial(TrialConfig(**(asdict(SPEC) | {"method": "uncorrected"})), scene, simulated=shown)
-    assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
-
-
-def test_missed_and_false_relations_are_counted_like_recognised_ones(
-    scene: Scene, shown: SimulatedDemonstration
-) -> None:
-    for contact_source, counts in (("false-negative", (1, 1, 0)), ("false-positive", (2, 0, 1)), ("given", (2, 0, 0))):
-        made = run_trial(TrialConfig(**(asdict(SPEC) | {"contact_source": contact_source})), scene, simulated=shown)
-        assert (
-            made["contacts_true_positive"],
-            made["contacts_false_negative"],
-            made["contacts_false_positive"],
-        ) == counts
-
-
 def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
     rows = [row("detected", "paper"), row("detected", "contact"), row("detected", seed=1, contacts_false_negative=1)]
     (found,) = tabulate_detection(
         [*rows, row("given"), row("false-negative"), row("detected", "uncorrected", **UNCOUNTED)]
     )
-    assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [
-        2,
-        (1, 2),
-        6,
-        1,
-        0,
-    ]
+    assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [2, (1, 2), 6, 1, 0]
     assert found["precision"] == 1.0
     assert found["recall"] == pytest.approx(6 / 7)
-
-
-def test_scenarios_are_also_counted_together() -> None:
-    rows = [row("detected"), row("detected", scenario="two", contacts_true_positive=1, contacts_false_positive=2)]
-    found = {line["scenario"]: line for line in tabulate_detection(rows)}
-    assert list(found) == ["one", "two", ALL]
-    assert [found[ALL][name] for name in ("demonstrations", "complete", "right", "false")] == [2, (1, 2), 4, 2]
-    assert found["two"]["precision"] == pytest.approx(1 / 3)
-
-
-def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
-    found = tabulate_detection([row("detected-jointly", contacts_true_positive=0, contacts_false_negative=3)])
-    assert (found[0]["precision"], found[0]["recall"]) == (None, 0.0)
-    assert detection_table(found).markdown()[-1].endswith("| 3 | 0 | – | 0.00 % |")
-    assert detection_table(()).markdown() == ["No method used detected contacts."]
-    detection_table(found).write(tmp_path / "table.csv")
-    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
-        (line,) = csv.DictReader(file)
-    assert (line["missed"], line["precision"], line["recall"]) == ("3", "", "0.0")
-
-
-def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["detect-contacts", "stick_in_tower", "--observation", SEEN, "--contact-source", "detected-jointly"]
-    assert cli.main(asked) == 0
-    said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert {"contacts true positive 9", "contacts false negative 0", "contacts false positive 0"} <= set(said)
-    assert cli.main([*asked, "--json"]) == 0
-    form = json.loads(capsys.readouterr().out)
-    assert 0.9 < form["probability"] <= 1.0
-    assert form["next"] is None or form["next"]["with"] or form["next"]["without"]
 
 
 def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -147,10 +92,6 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
         (
             ["detect-contacts", "stick_in_tower", "--observation", SEEN, "--noise-level", "1"],
             "--noise-level, which draws a trial",
-        ),
-        (
-            ["run", "stick_in_tower", "--observation", SEEN, "--contact-source", "false-negative"],
-            "--contact-source was given together",
         ),
     ],
 )

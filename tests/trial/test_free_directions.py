@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from apo_bench import Observation
 from apo_bench.assembly import build_contact_equations
 from apo_bench.geometry import Array
-from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
+from apo_bench.trial.free_directions import FreeSpace, free_space, nearest_fitting, shortest_above
 from tests import scenes
 
 
@@ -43,21 +43,6 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
     assert (factors > -1e-7).all()
 
 
-def test_what_cannot_be_has_no_shortest_point() -> None:
-    assert shortest_above(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0])) is None
-    assert shortest_above(np.zeros((1, 3)), np.ones(1)) is None
-
-
-@pytest.mark.parametrize("dimensions", [1, 12])
-def test_even_points_come_nearest_first_and_are_spread_as_a_normal_distribution(dimensions: int) -> None:
-    points = np.array(list(even_points(dimensions)))
-    lengths = np.linalg.norm(points, axis=1)
-    assert (np.diff(lengths) >= 0.0).all()
-    np.testing.assert_allclose(points.mean(axis=0), 0.0, atol=0.25)
-    np.testing.assert_allclose(points.std(axis=0), 1.0, atol=0.25)
-    np.testing.assert_array_equal(points, np.array(list(even_points(dimensions))))
-
-
 @pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])
 def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
     scene = scenes.ALL[name]()
@@ -70,36 +55,6 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
         assert goals is not None
         assert build_contact_equations(scene.assembly, scene.start, goals).gaps(goals).max() < 1e-9
         np.testing.assert_allclose(goals[:, :3, 3], space.tangent(s)[:, :3, 3], atol=3e-3)
-
-
-def test_contacts_that_are_open_may_stay_open() -> None:
-    """Only what holds is held: the castle that stands 1 mm aside is no reason to move it."""
-    scene = scenes.stick_in_tower()
-    goals = scene.goals.copy()
-    goals[2] = goals[2] @ scenes.mm(0, 1, 0)
-    space = free_space(is_uncorrected(scene), goals)
-    assert space is not None
-    assert len(space) > len(space_of(scene))
-    before = build_contact_equations(scene.assembly, scene.start, goals).gaps(goals)
-    moved = space.place(np.full(len(space), 0.5))
-    assert moved is not None
-    after = build_contact_equations(scene.assembly, scene.start, moved).gaps(moved)
-    assert (after[before < 1e-9] < 1e-9).all()
-
-
-def test_the_nearest_place_is_found_by_linearising() -> None:
-    """A wall that all goals are to be beyond: the answer is its nearest point, in standard deviations."""
-    space = space_of(scenes.stick_in_tower())
-    axis = np.eye(len(space))[1]
-
-    def excess(goals: Array) -> Array:
-        return np.array([1e3 * (space.goals - goals)[:, 0, 3].sum() + 2.0])
-
-    found = nearest_fitting(space, lambda goals: True, excess)
-    assert found is not None
-    assert excess(found)[0] <= 0.0
-    assert excess(found)[0] > -0.2
-    assert excess(space.tangent(0.0 * axis))[0] == pytest.approx(2.0)
 
 
 def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_is_gone() -> None:

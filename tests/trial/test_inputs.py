@@ -6,7 +6,6 @@ import json
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,8 @@ import pytest
 import trimesh
 
 import apo_bench
-from apo_bench import InputError, SweepConfig, run_sweep
-from apo_bench.io import list_named_files
 from apo_bench.resources import folder
-from apo_bench.trial.inputs import module_files, own_content
+from apo_bench.trial.inputs import module_files
 
 AUDITED = """
 import json, os, sys
@@ -195,48 +192,6 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
     changed = json.loads(done.stdout.splitlines()[-1])
     assert expected <= set(changed)
     assert {file: found for file, found in changed.items() if found is not True} == {}
-
-
-def test_a_sweep_is_not_continued_with_a_part_of_another_density(tmp_path: Path) -> None:
-    write_home(tmp_path)
-    grid = SweepConfig(
-        (str(tmp_path / "scenario.toml"),),
-        trials=1,
-        noise_level=(5.0,),
-        human_error_scale=(0.0,),
-        method=("uncorrected",),
-    )
-    assert len(run_sweep(grid, tmp_path / "out")) == 1
-    beside = tmp_path / "own_peg.toml"
-    beside.write_text(beside.read_text().replace("density = ", "density = 1"))
-    with pytest.raises(InputError, match=r"another sweep \(inputs: scenario, part peg was .*\); choose"):
-        run_sweep(replace(grid, trials=2), tmp_path / "out")
-
-
-def test_a_model_names_its_files_wherever_they_are_stated(tmp_path: Path) -> None:
-    for name in ("a/mesh.stl", "a/skin.png", "deep/inner.xml", "deep/own.stl", "not_named.stl"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text("")
-    (tmp_path / "arm.xml").write_text(
-        '<mujoco><compiler assetdir="a"/><asset><mesh file="mesh.stl"/><texture fileright="skin.png"/>'
-        '<mesh file="gone.stl"/></asset><include file="deep/inner.xml"/></mujoco>'
-    )
-    (tmp_path / "deep" / "inner.xml").write_text(
-        '<mujoco><asset><mesh file="somewhere/own.stl"/></asset><include file="../arm.xml"/></mujoco>'
-    )
-    names = [file.relative_to(tmp_path).as_posix() for file in list_named_files(tmp_path / "arm.xml")]
-    assert names == ["arm.xml", "deep/inner.xml", "a/mesh.stl", "a/skin.png", "deep/own.stl"]
-    assert list_named_files(tmp_path / "not_there.xml") == (tmp_path / "not_there.xml",)
-
-
-def test_your_own_code_counts_where_it_makes_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "own_noise_1.py").write_text("def blur(goals, rng): return goals\n")
-    (tmp_path / "own_noise_2.py").write_text("def blur(goals, rng): return goals + 0\n")
-    one, two = (own_content("noise", f"own_noise_{k}:blur") for k in (1, 2))
-    assert list(one) == ["noise own_noise_1:blur"]
-    assert list(one.values()) != list(two.values())
-    assert own_content("contact_source", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
 
 
 def test_a_module_counts_with_what_it_imports_from_the_same_place(

@@ -43,20 +43,6 @@ def test_the_assembly_is_always_the_same() -> None:
     np.testing.assert_allclose(planned[:, 2, 3], SCENARIO.goals[:, 2, 3], rtol=0, atol=1e-12)
 
 
-def test_no_other_place_fits_better() -> None:
-    """The sum of squares of the twists, a quadratic form of body twists, is least where the goals were put."""
-    goals = place_layout(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).poses
-    found = fit_nominal_poses(SCENARIO.goals, seen(goals))
-
-    def misfit(planned: Array) -> float:
-        return sum(float(np.sum(pose.log(pose.inverse(a) @ b) ** 2)) for a, b in zip(planned, goals, strict=True))
-
-    for moved in ((1e-4, 0, 0), (0, 1e-4, 0), (0, 0, 0.01)):
-        for sign in (-1, 1):
-            x, y, deg = sign * np.array(moved)
-            assert misfit(pose.at((x, y, 0.0), (0.0, 0.0, deg)) @ found) > misfit(found)
-
-
 def test_operations_that_were_not_seen_are_left_out() -> None:
     layout = place_layout(SCENARIO, 0.13, -0.05, 0.3)
     goals = np.array(layout.poses)

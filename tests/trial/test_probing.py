@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
-from apo_bench.records import SecretSeed, TrialRecord
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.validation import unwritable
-from apo_bench.trial.stages import IN_HAND, WRENCH, stream, stream_key
 
 FELT = (
     "probe_contacts",
@@ -53,14 +51,3 @@ def test_a_robot_that_does_not_feel_says_nothing(scene: Scene) -> None:
     given = ("config_hash", "ft_sensor", "assumed_robot_error")
     same = [column for column in found if column not in given]
     assert [again.get(column) for column in same] == [found.get(column) for column in same]
-
-
-def test_the_noise_of_the_sensor_has_a_stream_of_its_own() -> None:
-    assert WRENCH == IN_HAND + 1
-    secret_seed = SecretSeed(b"0" * 32)
-    for given in (None, secret_seed):
-        key = stream_key(3, WRENCH, given)
-        assert np.random.default_rng(key).random() == stream(3, WRENCH, given).random()
-    assert stream_key(3, WRENCH) == (3, WRENCH)
-    assert stream_key(3, WRENCH, secret_seed)[:2] == (3, WRENCH)
-    assert len(stream_key(3, WRENCH, secret_seed)) > 2

@@ -53,25 +53,3 @@ def test_a_plan_is_the_same_whatever_is_wrong_with_the_robot_and_ends_elsewhere(
             assert found.get(column) == right.get(column)
         assert found["reached"] != right["reached"]
         assert found["robot_error"] == wrong
-
-
-def test_a_wrong_base_moves_a_held_part_as_much(scene: Scene) -> None:
-    """Pads centre a part across; where it ends differs by no more than what the base is off."""
-    error = draw_robot_error("hand_eye:2", scene, SEED)
-    assert error is not None
-    right, wrong = (row(scene, name, method="oracle", grasp="friction")["reached"] for name in ("none", "hand_eye:2"))
-    assert right is not None
-    assert wrong is not None
-    moved = np.array([np.subtract(wrong[part], right[part])[:2] for part in right])
-    off = 1e3 * np.linalg.norm(error.hand_eye[:2, 3])
-    assert 0.2 < np.linalg.norm(moved, axis=1).max() < off + 0.2
-
-
-def test_a_part_slips_by_what_was_drawn(scene: Scene) -> None:
-    error = draw_robot_error("in_hand:0.5", scene, SEED)
-    moved = row(scene, "in_hand:0.5", method="oracle")["grasp_slip"]
-    assert error is not None
-    assert moved
-    for each in moved:
-        drawn = 1e3 * np.linalg.norm(error.in_hand[each["operation"] - 1][:3, 3])
-        assert abs(each["carried_mm"] - drawn) < 0.2, "in the pads it settles anew"

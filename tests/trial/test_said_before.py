@@ -25,15 +25,8 @@ MISSED = TrialConfig(
     min_predicted_success=1.0,
 )
 SAID = (
-    "failure_prediction",
-    "predicted_success",
-    "gap_before_mm",
-    "gap_after_mm",
-    "fit_adjustments",
-    "corrected_operations",
-    "tried_corrections",
-    "chi_square",
-    "sentence",
+    *("failure_prediction", "predicted_success", "gap_before_mm", "gap_after_mm", "fit_adjustments"),
+    *("corrected_operations", "tried_corrections", "chi_square", "sentence"),
 )
 
 

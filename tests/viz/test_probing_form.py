@@ -9,21 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench import InputError, Plan, Scene, build_scene, load_scenario
+from apo_bench import Plan, Scene, build_scene, load_scenario
 from apo_bench.formats.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import place_layout
 from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.probing.config import PROBING_ACTIONS
-from apo_bench.simulation.execution.probing.lay_flat import averaged_s
 from apo_bench.simulation.execution.probing.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.side_touches import STAND_OFF_M
-from apo_bench.simulation.robot.by_wrist import get_wrist
-from apo_bench.simulation.robot.robot import Robot
 from apo_bench.viz.probing_form import probing_form
 from tests.viz.test_robot_form import BASE, TOOL, matrix
 
-NAMES = ["stick_in_tower", "peg_in_hole"]
 FRAMES = {"tip": RobotFrames(), "flange": RobotFrames(BASE, TOOL, "wxyz")}
 PLACES = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
 
@@ -74,13 +70,6 @@ def test_touches_are_where_the_simulated_hand_touches(name: str, frames: str) ->
     assert said["at_most_mm"] > said["expected_after_mm"] == 1e3 * STAND_OFF_M
 
 
-def test_only_what_has_walls_to_fit_into_is_touched_from_the_side() -> None:
-    stick, peg = (form(name)["touch"] for name in NAMES)
-    assert (len(stick["floor"]), stick["walls"], stick["one_wall_from_both_sides"]) == (3, [], [])
-    assert (len(peg["floor"]), len(peg["one_wall_from_both_sides"])) == (3, 2)
-    assert peg["walls"]
-
-
 @pytest.mark.parametrize(("name", "frames"), [("stick_in_tower", "tip"), ("peg_in_hole", "flange")])
 def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
     assert any(one["lay_flat"] for one in form(name)["steps"])
@@ -107,25 +96,3 @@ def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
                 assert np.allclose(begins, place.T, atol=1e-9)
                 touched = pose.apply(begins, 1e-3 * np.array([told["point_in_part_mm"]]))[0]
                 assert n @ touched - d == pytest.approx(STAND_OFF_M, abs=1e-9)
-
-
-def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor_that_cannot_tell() -> None:
-    def averaged(name: str, sensor: str) -> list[float | None]:
-        laid = [one["lay_flat"] for one in form(name, sensor=sensor)["steps"]]
-        flat = [move.transfer.flat for move in plan_moves(plan(name), scene(name), True, PROBING_ACTIONS)]
-        return [each and each["averaged_over_s"] for each, f in zip(laid, flat, strict=True) if f is not None]
-
-    for sensor, felt in (("wrist", 0.1), ("joint-torque", 3.5)):
-        sigma = get_wrist(
-            Robot(scene("stick_in_tower"), plan("stick_in_tower").start), sensor, np.random.default_rng(0)
-        ).sigma
-        flush = plan_moves(plan("stick_in_tower"), scene("stick_in_tower"), True, PROBING_ACTIONS)[-1].transfer.flat
-        assert sigma[0] < felt
-        assert averaged("stick_in_tower", sensor) == [pytest.approx(averaged_s(flush, sigma), abs=1e-6)]
-    assert averaged("peg_in_hole", "joint-torque") == [None]
-    assert averaged("peg_in_hole", "wrist") != [None]
-
-
-def test_an_unknown_sensor_is_refused() -> None:
-    with pytest.raises(InputError, match="externl"):
-        probing_form(plan("stick_in_tower"), scene("stick_in_tower"), RobotFrames(), "externl")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -57,23 +56,6 @@ def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> N
     cursor.press("play")
     cursor.pass_time(10.0)
     assert (cursor.place, cursor.playing) == (3, False)
-
-
-def test_segments_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None:
-    one = scenario_story(tower)
-    cursor = Cursor(Rollout(tower, (one.segments[0], replace(one.segments[0], title="again")), one.assembled))
-    cursor.press("next segment")
-    assert (cursor.place, cursor.segment.title) == (4, "again")
-    cursor.press("previous")
-    cursor.press("play")
-    assert (cursor.place, cursor.playing) == (0, True)
-    cursor.pass_time(1.5)
-    assert cursor.place == 1
-    cursor.pass_time(9.0)
-    assert (cursor.place, cursor.playing) == (3, False)
-    cursor.go(99)
-    cursor.press("previous segment")
-    assert cursor.place == 4
 
 
 def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> None:
@@ -200,15 +182,6 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
     for request, sentence in said.items():
         assert main(request) == 2
         assert sentence in capsys.readouterr().err
-
-
-def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
-    pytest.importorskip("viser")
-    from apo_bench.viz.browser import serve_rollout
-
-    said: list[str] = []
-    serve_rollout(with_target_poses(tower), 18417, said.append, ends=lambda: bool(said))
-    assert said[0].startswith("Open http://127.0.0.1:18")
 
 
 def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:

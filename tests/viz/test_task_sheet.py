@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,10 +9,8 @@ import pytest
 from apo_bench import load_scenario
 from apo_bench.scenario.file import list_scenario_names
 from apo_bench.viz.task_sheet import task_sheet
-from benchmarks.baselines import describe, describe_nominal, read_counts
 from docs.task_sheets import page
 
-JUDGE = Path(__file__).parents[2] / "docs" / "how" / "judge.md"
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 
 
@@ -31,43 +28,21 @@ def test_the_operations_of_fig_6() -> None:
 
 
 def test_parts_that_follow_a_human_error() -> None:
-    text = task_sheet(load_scenario("vanished_fixture"))
-    assert (
-        "operation 2 displaces cube by 1.5 to 4 mm along its y axis, to either side; castle2 (operation 3) follows;"
-        in text
-    )
+    lines = task_sheet(load_scenario("vanished_fixture")).splitlines()
+    error = "operation 2 displaces cube by 1.5 to 4 mm along its y axis; castle2 (operation 3) follows"
+    assert f"- Human error: {error}." in lines
     assert "follow" not in task_sheet(load_scenario("carried_bridge"))
-    assert "The scenario states no human error." in task_sheet(load_scenario("bridge_cycle"))
+    assert "- Human error: none." in task_sheet(load_scenario("bridge_cycle")).splitlines()
 
 
-def test_numbers_are_those_of_the_scenario() -> None:
-    scenario = load_scenario("stick_in_tower")
-    text = task_sheet(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, displaced_mm=7.0)))
-    assert "at 0.4 mm clearance per side: fit margin mm 0.1, " in text
-    assert ", displaced mm 7, " in text
-    assert "x 120 ± 40 mm, y 0 ± 60 mm, turned by -28 to 28 degrees" in text
-    assert "- Operation 2: castle2 by -4 to 4 mm along its x axis." in text
-
-
-@pytest.mark.parametrize("name", ["gearbox", "pocket_table"])
-def test_every_scenario_says_all_of_it(name: str) -> None:
-    scenario = load_scenario(name)
-    text = task_sheet(scenario)
-    heads = [line for line in text.splitlines() if line.startswith("## ")]
-    assert heads == ["## Parts", "## Operations", "## Human", "## Variations", "## Success"]
-    for words in (scenario.title, scenario.paper, scenario.human, scenario.success):
-        assert words
-        assert words in text
-    assert [line.split()[0] for line in text.splitlines() if line.split(". ")[0].isdigit()] == [
-        f"{k + 1}." for k in range(len(scenario.assembly))
-    ]
+def test_what_is_particular_to_a_verdict() -> None:
+    text = task_sheet(load_scenario("fixture_alignment"))
+    assert "- Verdict: as demonstrated." in text
+    assert "- Fixtures: B." in text
+    assert "- Allowed gaps beyond the clearance: " in task_sheet(load_scenario("dovetail"))
 
 
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
     scenarios = [load_scenario(name) for name in list_scenario_names()]
-    measured = {scenario.name: describe(scenario, read_counts()) for scenario in scenarios}
-    assert PAGE.read_text(encoding="utf-8") == page(scenarios, measured), "run: python docs/task_sheets.py"
-    assert describe_nominal(scenarios, read_counts()) in JUDGE.read_text(encoding="utf-8"), (
-        "run: python docs/task_sheets.py"
-    )
+    assert PAGE.read_text(encoding="utf-8") == page(scenarios), "run: python docs/task_sheets.py"

@@ -7,7 +7,6 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from rich.console import Console
 
 from apo_bench import Correction, Observation
@@ -15,7 +14,7 @@ from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.geometry import pose
 from apo_bench.perception.detection.evidence import DetectedContacts, Evidence, Rival
 from apo_bench.perception.detection.thresholds import PairThresholds
-from apo_bench.viz.correct_text import POSE_COLUMNS, correction_form, correction_lines
+from apo_bench.viz.correct_text import correction_form, correction_lines
 from apo_bench.viz.detection_text import CONTACT_COLUMNS, detection_form
 from apo_bench.viz.form_text import form_table
 from tests import scenes
@@ -65,17 +64,6 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} not in form["missed"]
     assert form["next"] == {"probability": 0.25, "with": [], "without": []}
     json.dumps(form, allow_nan=False)
-
-
-def test_a_correction_is_said_with_how_far_it_moved_each_goal() -> None:
-    observation = tower()
-    form = correction_form("tower", "contact", observation, corrected(observation), None, False)
-    moved = [row[-2:] for row in table_lines(form_table(form["operations"], POSE_COLUMNS))[1:]]
-    assert moved == [["0.000", "0.000"], ["3.000", "2.000"], ["0.000", "0.000"]]
-    second = form["operations"][1]
-    assert (second["operation"], second["part"]) == (2, "castle2")
-    assert (second["moved_mm"], second["turned_deg"]) == (pytest.approx(3.0), pytest.approx(2.0))
-    assert (form["gap_before_mm"], form["gap_after_mm"]) == (pytest.approx(4.0), pytest.approx(1e-6))
 
 
 def test_infinite_numbers_of_a_correction_are_null() -> None:

@@ -8,8 +8,6 @@ from typing import Any
 import pytest
 
 from apo_bench.assembly import Outcome
-from apo_bench.benchmark.analysis import tally
-from apo_bench.cli.rates import print_rates
 from apo_bench.trial.endings import end_record
 from apo_bench.viz.trial_text import summary_lines
 from tests.benchmark.analysis.test_rates import row
@@ -25,8 +23,6 @@ def record(success: bool, code: str = "gap", **more: Any) -> Any:
     [
         ("gap", {"worst_gap_mm": 7.0}, ("worst gap", "7.000 mm between faces that should touch")),
         ("overlap", {"least_overlap": 0.25, "worst_gap_mm": 0.1}, ("least overlap", "25% of the true overlap")),
-        ("force_stop", {"peak_force_n": 21.04}, ("peak force", "21.0 N")),
-        ("penetration", {"penetration_mm": None, "peak_force_n": 2.0}, ("peak force", "2.0 N")),
     ],
 )
 def test_the_fourth_line_is_the_number_that_decides(code: str, numbers: dict[str, Any], line: tuple[str, str]) -> None:
@@ -41,15 +37,3 @@ def test_the_last_line_shows_the_trial_again() -> None:
     measured = summary_lines(record(True, noise_mm=None, noise_deg=None), file, Path("seen.csv"))
     assert measured[5][1] == f"apo-bench run {file} --clearance-mm 0.25 --method contact --observation seen.csv --view"
     assert "measured observation" in measured[0][1]
-
-
-def test_a_robot_that_probes_names_its_sensor() -> None:
-    probing = record(True, method="contact+probe", ft_sensor="joint-torque", assumed_robot_error="matched")
-    trial = summary_lines(probing, "stick_in_tower")[0][1]
-    assert trial.endswith(", ft sensor joint-torque")
-    assert "ft sensor" not in summary_lines(record(True, ft_sensor="joint-torque"), "stick_in_tower")[0][1]
-
-
-def test_demonstrations_that_failed_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
-    print_rates(tally([row("contact", 9), *(row("contact", i, None) for i in range(2))]))
-    assert "the demonstration itself failed: 2" in capsys.readouterr().out

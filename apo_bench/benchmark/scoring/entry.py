@@ -96,7 +96,7 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 100.0 * right / self.executed if self.executed else None
 
 
-class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a method scored.
 
     Raises:
@@ -116,6 +116,8 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Of the packages that matter, and of Python."""
     machine: Name
     tracks: Annotated[Mapping[Name, TrackScore], Meta(min_length=1, max_length=50)]
+    real: bool = False
+    """Whether the trials were made with a real robot and reported in a form."""
 
     def __post_init__(self) -> None:
         shown = (self.name, self.method, self.command, self.machine, *self.tracks)

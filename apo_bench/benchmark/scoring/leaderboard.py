@@ -16,16 +16,18 @@ from apo_bench.benchmark.scoring.track import read_track, track_names
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, group_by, save_figure, use_figure_style, write_file
 
-_PROVES = (
-    "`self-reported` proves nothing: anyone with the package can draw public seeds again. The author of this table ran "
+_STATUS = (
+    "A `self-reported` entry is unverified, since anyone can draw public seeds again. The author of this table ran "
     "`verified` entries with trials of a secret seed, whose hash was published before; entrants that are not trusted "
-    "ran as programs, which get observations and nothing else. Entries marked `quick` ran a few trials, which are no "
-    "score."
+    "ran as programs, which get observations and nothing else. `real` entries are forms of trials with a real robot. "
+    "`quick` entries ran a few trials, which are no score."
 )
-_EVERY = (
-    "Success rate in percent, mean over the conditions of a track, with its 95 % interval over seeds; in brackets the "
-    "rate of the plans that were executed, where some were not."
+_RATES = (
+    "Success rate in percent, mean over the conditions of a track, with its 95 % interval over seeds. In brackets: the "
+    "rate of executed plans, where some were not executed."
 )
+_BRIER = "Brier score of the predicted success in each track: 0 is best, 0.25 is a coin."
+_RUNS = "The file of each entry also has the hashes of tracks, code and records."
 _MOST_SQUARES = 50
 """Entries, or tracks, that the figure shows; the tables have all."""
 _LONGEST_LABEL = 30
@@ -40,15 +42,8 @@ class Line(NamedTuple):
 
     @property
     def status(self) -> str:
-        return ("verified" if self.verified else "self-reported") + ", quick" * self.entry.quick
-
-
-class Run(NamedTuple):
-    """An entry in one of its tracks."""
-
-    entry: Entry
-    name: str
-    track: TrackScore
+        status = "verified" if self.verified else "self-reported"
+        return "real, " * self.entry.real + status + ", quick" * self.entry.quick
 
 
 def ranked(entries: Sequence[Entry], secret_seeds: frozenset[str] = frozenset()) -> list[Line]:
@@ -149,41 +144,24 @@ def _tracks(entries: Sequence[Entry]) -> list[str]:
 
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
-    runs = [Run(line.entry, name, line.entry.tracks[name]) for line in lines for name in line.entry.tracks]
     entry = TableColumn("name", "entry", "entry.name", words=True)
-    track = TableColumn("track", "track", "name", words=True)
-    every = (entry, *(TableColumn(name, name, partial(_score_words, name)) for name in tracks))
-    predicting = (
-        *(
-            entry,
-            track,
-            TableColumn("predicted_success", "predicted success", text="{track.predicted_success:percent}"),
-        ),
-        TableColumn("score", "score", text="{track.score:.1f}"),
-        TableColumn("brier", "Brier score", text="{track.brier:.3f}"),
-    )
-    hashes = (
-        *(entry, track, TableColumn("trials", "trials", "track.trials")),
-        TableColumn("file", "track file", "track.track", words=True),
-        TableColumn("code", "code", "track.code", words=True),
-        TableColumn("rows", "records", "track.rows", words=True),
-    )
-    machines = (
-        *(entry, TableColumn("command", "command", "entry.command", words=True)),
-        TableColumn("versions", "versions", _versions_text, words=True),
-        TableColumn("machine", "machine", "entry.machine", words=True),
-    )
-    yield from ("# Leaderboard", "", "Written by `apo-bench leaderboard`.", "", _PROVES, "")
+    rates = (entry, *(TableColumn(name, name, partial(_score_words, name)) for name in tracks))
+    brier = (entry, *(TableColumn(name, name, partial(_brier, name)) for name in tracks))
+    trials = TableColumn("trials", "trials", lambda line: sum(track.trials for track in line.entry.tracks.values()))
+    runs = (entry, trials, TableColumn("command", "command", "entry.command", words=True))
+    same = group_by((_machine_text(line.entry), line.entry.name) for line in lines)
+    machine = TableColumn("machine", "versions and machine", lambda group: group[0], words=True)
+    machines = (TableColumn("entries", "entries", lambda group: ", ".join(group[1]), words=True), machine)
+    yield from ("# Leaderboard", "", f"{len(lines)} entries, the best first.", "")
     yield from leaderboard_table(lines).markdown()
-    yield from ("", f"![Scores of entries in tracks]({picture})", "", "## Every track", "", _EVERY, "")
-    yield from Table(lines, every).markdown()
-    yield from ("", "## Predicted success", "")
-    brier = [run for run in runs if run.track.brier is not None]
-    yield from Table(brier, predicting, "No entry predicts success.").markdown()
-    yield from ("", "## Runs", "")
-    yield from Table(runs, hashes).markdown()
+    yield from ("", _STATUS, "", f"![Scores of entries in tracks]({picture})", "", "## Tracks", "", _RATES, "")
+    yield from Table(lines, rates).markdown()
+    yield from ("", "## Predicted success", "", _BRIER, "")
+    yield from Table(lines, brier).markdown()
+    yield from ("", "## Runs", "", f"Written by `apo-bench leaderboard`. {_RUNS}", "")
+    yield from Table(lines, runs).markdown()
     yield ""
-    yield from Table(lines, machines).markdown()
+    yield from Table(list(same.items()), machines).markdown()
 
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
@@ -194,7 +172,7 @@ def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
 
         figure = Figure(figsize=(0.72 * len(tracks) + 3.0, 0.42 * len(lines) + 2.0), layout="constrained")
         axes = figure.subplots()
-        scores = [[_score(line.entry.tracks.get(name)) for name in tracks] for line in lines]
+        scores = [[t.score if (t := line.entry.tracks.get(name)) else None for name in tracks] for line in lines]
         shown = axes.imshow(np.array(scores, dtype=float), vmin=0.0, vmax=100.0, cmap="Blues", aspect="auto")
         for y, row in enumerate(scores):
             for x, value in enumerate(row):
@@ -227,9 +205,10 @@ def _score_words(name: str, line: Line) -> str | None:
     return f"{track.score:.1f} ({track.low:.0f} to {track.high:.0f}){less}"
 
 
-def _score(track: TrackScore | None) -> float | None:
-    return None if track is None else track.score
+def _brier(name: str, line: Line) -> str | None:
+    track = line.entry.tracks.get(name)
+    return None if track is None or track.brier is None else f"{track.brier:.3f}"
 
 
-def _versions_text(line: Line) -> str:
-    return ", ".join(f"{name} {version}" for name, version in line.entry.versions.items())
+def _machine_text(entry: Entry) -> str:
+    return f"{', '.join(f'{name} {version}' for name, version in entry.versions.items())}; {entry.machine}"

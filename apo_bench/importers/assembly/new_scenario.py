@@ -112,7 +112,7 @@ def new_scenario(
         f"in the order {', '.join(wanted_order)} these parts cannot be put together; {', '.join(mains)} can be: name "
         "every part once that is not fixed, an inner part before the outer one.",
     )
-    # The site of the assembly is kept free, and of a sub-assembly that is put together beside it.
+    # The site of the assembly is kept free, and of a sub-assembly that is put together next to it.
     is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
     site = choose_site(reach, is_beside)
     middles = [site.center_m, site.center_m + aside[:2]] if is_beside else [site.center_m]

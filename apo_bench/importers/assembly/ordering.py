@@ -2,7 +2,7 @@
 
 A part can leave if a straight way out of all its contacts is free, also for the hand above it, and if the part, put
 back, would rest on the others. Where no part can leave alone, connected parts leave as one group: they are put together
-beside the assembly first, on the table.
+next to the assembly first, on the table.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -158,7 +158,7 @@ class OrderSearch:
         return Placing(tuple(moves), contacts, poses[main], f"comes {direction}, onto {others}")
 
     def _put_together_beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
-        """Return how a group is put together beside the assembly, its main part on the table."""
+        """Return how a group is put together next to the assembly, its main part on the table."""
         main = group[0]
         stance = find_stance(self.solids[main], self.poses[main][:3, :3])
         if not stance.stands or stance.rolls:

@@ -61,7 +61,7 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     """Read every copy of a part that a file of poses names.
 
     Args:
-        files: Part files, or names of parts of the package. Other part files are beside the file of poses.
+        files: Part files, or names of parts of the package. Other part files are next to the file of poses.
 
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.

@@ -12,7 +12,7 @@ class ContactFit(NamedTuple):
     """The worst of some contacts."""
 
     gap_m: float
-    """From the middle of the smaller face to the plane of the other one and from beside it to it, or between axes."""
+    """Distance of the middle of the smaller face from the other face, or of two axes."""
     angle_rad: float
     """Between the normal of one and the opposite of the other, or between axes."""
 
@@ -33,7 +33,7 @@ def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
         measured = measure_round(a, T_a, b, T_b)
         return ContactFit(abs(measured.gap_m), measured.angle_rad)
-    # From the middle of the smaller face: how high above the plane of the larger one, how far beside its outline.
+    # From the middle of the smaller face: how high above the plane of the larger one, how far outside its outline.
     if measure_face_area(a) > measure_face_area(b):
         (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
     cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))

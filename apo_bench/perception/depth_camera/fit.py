@@ -13,7 +13,7 @@ from apo_bench.perception.depth_camera.surface import Surface, load_small_gicp
 _LEAST_NOISE_M = 0.0001
 """What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
 BENT_M = 0.003
-"""Noise of this size doubles the covariance: beside an edge the nearest surface is then often not the one that was
+"""Noise of this size doubles the covariance: near an edge the nearest surface is then often not the one that was
 hit, which the linear part of the formula does not know. `benchmarks/depth_camera.py` measures it."""
 PRIOR = copy_frozen([0.05] * 3 + [0.5] * 3, 6)
 """Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say

@@ -23,7 +23,7 @@ from apo_bench.perception.depth_camera.regions import Regions, find_changed_regi
 from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
 
 _GONE = 0.5
-"""A part has moved if so much of what was seen of it has vanished."""
+"""A part has moved if so much of what was observed of it has vanished."""
 _GRID = 3
 """Every so many pixels are looked up."""
 
@@ -59,7 +59,7 @@ class Expected:
     assembly: Assembly
     start: Poses
     turns: Array
-    """(n, 3, 3), the planned rotation of each goal, world; how the whole is turned is learnt from the first part."""
+    """(n, 3, 3), the planned rotation of each pose, world; the turn of the whole is learnt from the first part."""
     play_m: float = 0.0
     """Clearance per side: the models are the parts as they are made."""
 
@@ -72,7 +72,7 @@ def follow_demonstration(
     An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
     what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
     this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
-    pause of the hand looks the same as the end of an operation, so the others are not seen.
+    pause of the hand looks the same as the end of an operation, so the others are not observed.
     """
     assembly = expected.assembly
     believed = {part: expected.start[part] for part in assembly.solids}
@@ -122,8 +122,8 @@ def _spell(
 ) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
     """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
 
-    Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
-    a row that move the same parts it is the last, since the spell ends when something else moves.
+    Operation k is looked for first; one that moves something else may come instead, if k was not observed. Of
+    consecutive operations that move the same parts it is the last, since the spell ends when something else moves.
     """
     spell = None
     for last in range(first + 1, len(images)):

@@ -21,7 +21,7 @@ _MIDDLE = 500
 _FINE = 3000
 """Points of a first fit from every start, of the best of these, and of the last fit."""
 _BEST = 4
-"""Starts that are followed further: one fit in some ends beside the true place, so never only one."""
+"""Starts that are followed further: one fit in some ends off the true place, so never only one."""
 _WIDTH_M = 0.0015
 """Points this far away from a surface are half doubted; three standard deviations if that is more."""
 _WELL_SEEN = copy_frozen([0.001] * 3 + [np.radians(1.0)] * 3, 6)
@@ -107,7 +107,7 @@ def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel
     """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
 
     A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
-    the last fit is that of the main part alone, if enough of it can be seen.
+    the last fit is that of the main part alone, if enough of it is visible.
     """
     if len(points) < 6:
         return None

@@ -66,9 +66,9 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
 
 @lru_cache(maxsize=4)
 def _two_views() -> tuple[PinholeView, ...]:
-    """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
+    """From the left in front and from the right behind, 45 degrees high: together they cover every side of a part.
 
-    One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
+    One view is not enough: of a stick that lies in a tower only its ends are visible, and only one of them from
     either side. At 0.95 m a pixel is 3 mm wide.
     """
     reach = 0.67

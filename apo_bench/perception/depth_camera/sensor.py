@@ -14,7 +14,7 @@ from apo_bench.perception.depth_camera.rays import MakeRayCaster
 from apo_bench.perception.observation.models import floor_covariance
 
 _UNSEEN = copy_frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
-"""The covariance that stands beside an operation that was not seen, [m, rad]."""
+"""The covariance of an operation that was not observed, [m, rad]."""
 
 
 @final
@@ -33,7 +33,7 @@ class RangeSensor:
     level_m: float
     """Standard deviation of a ray."""
     turns: Array
-    """(n, 3, 3), the planned rotation of each goal, world."""
+    """(n, 3, 3), the planned rotation of each target pose, world."""
     play_m: float
     """Clearance per side, as the models are those of the parts as they are made."""
     make_caster: MakeRayCaster

@@ -14,7 +14,7 @@ def guess_poses(corners: Array, points: Array, same: Array) -> Array:
     """Poses (s, 4, 4) of a shape whose visible surface may be the points (n, 3), world, [m].
 
     The smallest rectangle around the points, seen from above, says how the sides of a part that stands on one of its
-    sides are turned; of the 24 ways to put a box on a table those that look alike are tried once. The part is put in
+    sides are turned; of the 24 ways to put a box on a table those that look the same are tried once. The part is put in
     the middle of the rectangle, and as high as the points reach.
 
     Args:

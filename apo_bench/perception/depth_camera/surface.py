@@ -32,7 +32,7 @@ class Surface:
 
     @cached_property
     def cloud(self) -> Any:
-        """The points as small_gicp has them, with normals of its own, which are round at edges."""
+        """The points as small_gicp has them, with its own normals, which are round at edges."""
         gicp = load_small_gicp()
         cloud = gicp.PointCloud(self.points)
         gicp.estimate_normals(cloud, self.tree, _NEIGHBOURS, 1)

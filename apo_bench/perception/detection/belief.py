@@ -43,7 +43,7 @@ class Belief:
         poses = dict(self.start)
         reach = {part: np.zeros((6, 6 * n)) for part in poses}
         for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.poses, strict=False)):
-            # A body twist xi of goal T is the world twist Ad(T) xi; what is carried moves on as the main part does.
+            # A body twist xi of pose T is the world twist Ad(T) xi; what is carried moves on as the main part does.
             own = np.zeros((6, 6 * n))
             own[:, 6 * i : 6 * i + 6] = pose.adjoint(T)
             by = T @ pose.inverse(poses[operation.main])

@@ -26,7 +26,7 @@ class Candidate(NamedTuple):
     distance: float
     """Squared Mahalanobis length of its residual."""
     gain: float
-    """Twice the logarithm of how much likelier a closed pair is than one anywhere in the room that is left."""
+    """Twice the logarithm of how much likelier a closed pair is than one anywhere in the range that is left."""
     deviation_m: float
     """Of its gap."""
     normal: Array

@@ -128,7 +128,7 @@ class _Around:
 
     def _judged(self, a: str, b: str, pair: FacingPair, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
-        # Body twists of all poses -> world twist of part a beside part b -> gap and tilts of the pair.
+        # Body twists of all poses -> world twist of part a relative to part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.observed].any():
             return

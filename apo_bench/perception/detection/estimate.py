@@ -1,14 +1,14 @@
 """Estimate poses under a set of contacts, and how likely that set is.
 
-Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a room that is
+Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a range that is
 much wider than the noise. What contacts leave at the observation, r = J xi - e, has the covariance J C J^t + S in the
-first case and J (C + R) J^t + S in the second, with C the noise, R the room and S what play and soft contacts add. The
+first case and J (C + R) J^t + S in the second, with C the noise, R the range and S what play and soft contacts add. The
 set explains the observation better than chance by
 
     log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
 
-twice the logarithm of a Bayes factor (of Savage and Dickey, with a room so wide that only its size counts). An equation
-that others imply adds as much to one determinant as to the other, so it gains nothing, as it should.
+twice the logarithm of a Bayes factor (of Savage and Dickey; the range is so wide that its size alone counts). Equations
+that others imply add equally to both determinants, so they gain nothing, as they should.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ _CARRIED = 3.0
 """So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
 _TURNS = 6
 _SMALL = 1e-5
-"""Steps of Gauss and Newton at most; they end when no goal moves by more, [m, rad]."""
+"""Steps of Gauss and Newton at most; they end when no pose moves by more, [m, rad]."""
 
 
 @final
@@ -49,7 +49,7 @@ class PoseEstimate:
     covariance: Array
     """(6 n, 6 n), of the body twists by which they are wrong, [m, rad]."""
     room: Array
-    """(6 n, 6 n), the same if nothing had been seen but the contacts."""
+    """(6 n, 6 n), the same if nothing had been observed but the contacts."""
     badness: float
     """-2 log of the Bayes factor of the contacts against none."""
 
@@ -58,7 +58,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimat
     """Solve for poses and contacts together.
 
     Args:
-        seen: What was seen; its contacts do not matter.
+        seen: What was observed; its contacts do not matter.
         assembly: Its first n operations, with the contacts that are supposed.
         begin: (n, 4, 4), poses to begin with.
     """
@@ -85,7 +85,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> PoseEstimat
         poses = seen.poses[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
-    # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.
+    # |A| and |B| are what contacts leave with the noise and in the range: see the head of this file.
     B = J @ room @ J.T + S
     badness = float(r @ np.linalg.solve(A, r) - (np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]))
     return PoseEstimate(assembly, poses, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)

@@ -24,7 +24,7 @@ class Evidence:
     most: PairThresholds
     """The thresholds."""
     seen_gap_m: float
-    """The gap at the poses as they were seen."""
+    """The gap at the poses as they were observed."""
 
 
 class Rival(NamedTuple):
@@ -48,7 +48,7 @@ class DetectedContacts:
 
 
 def without_contacts(observation: Observation) -> Observation:
-    """What was seen, with no contact of any operation."""
+    """What was observed, with no contact of any operation."""
     return replace(observation, assembly=replace(keep_evident_contacts(observation.assembly, ()), gaps={}))
 
 
@@ -70,7 +70,7 @@ def collect_evidence(
     """What speaks for the contacts of operation k, in the order of parts and faces.
 
     Args:
-        as_seen: Where every part was seen after the operation, world, [m].
+        as_seen: Where every part was observed after the operation, world, [m].
     """
     solids = assembly.solids
     parts = (assembly.operations[k].moves, tuple(solids))

@@ -1,7 +1,7 @@
 """Detect contacts and estimate poses together: of many sets of contacts the one that explains the poses best.
 
 Operation by operation, pairs of faces that may touch are taken or refused, the surest first; each set is scored with
-the poses that it asks for (`estimate`), by how much better it explains what was seen than chance does, less what it
+the poses that it asks for (`estimate`), by how much better it explains what was observed than chance does, less what it
 takes for granted: relations beyond the first, and what physics forbids. The best few sets go on to the next operation,
 which may turn the order round: a stick that fits through two castles says how these were stacked.
 """
@@ -167,12 +167,12 @@ class _Search:
         return min(self._open(partial), key=lambda c: (c.distance - c.gain, c.contact), default=None)
 
     def _rival(self, partial: _Partial, taking: _Partial) -> float:
-        """What the best of the pairs promises that one more contact puts out of the question, at most 0."""
+        """What the best of the pairs predicts that one more contact puts out of the question, at most 0."""
         left = {c.contact for c in (*self._open(taking), *taking.taken)}
         return min([0.0, *(c.distance - c.gain for c in self._open(partial) if c.contact not in left)])
 
     def _rare(self, partial: _Partial, c: Candidate) -> float:
-        """What it takes for granted that this pair touches, beside those that were taken."""
+        """What it takes for granted that this pair touches, in addition to those that were taken."""
         related = {before.parts for before in partial.taken}
         return _RELATION if related and c.parts not in related else 0.0
 

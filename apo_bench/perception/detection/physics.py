@@ -122,7 +122,7 @@ def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
         return _UNSUPPORTED
     if any(c.normal[2] < 0.0 for c in level):
         return 0.0
-    # The centre of mass of all parts that were moved, as of one density, beside the hull of the corners they stand on.
+    # The centre of mass of all parts that were moved, as of one density, off the hull of the corners they stand on.
     volumes = np.array([solids[part].volume for part in at.moves])
     middles = [pose.apply(at.now.poses[part], solids[part].centroid[None])[0] for part in at.moves]
     weight = volumes @ np.array(middles) / volumes.sum()

@@ -52,7 +52,7 @@ class Situation:
         return Belief(known.assembly, self.seen.start, known.poses, known.covariance).standing(self.k)
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """A part that was moved and one that stands there, both where something was seen."""
+        """A part that was moved and one that stands there, both where something was observed."""
         for a in self.moves:
             for b in self.others:
                 if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.observed[: self.k + 1]].any():
@@ -108,5 +108,5 @@ class Situation:
         return pair_thresholds(rules, worst, loose)
 
     def _reach(self, a: str, b: str) -> Array:
-        """(6, 6 n): the world twist of part a beside part b that body twists of the poses make."""
+        """(6, 6 n): the world twist of part a relative to part b that body twists of the poses make."""
         return self.now.reach[a] - self.now.reach[b]

@@ -44,7 +44,7 @@ class Station(NamedTuple):
     bodies: tuple[Body, ...] = ()
     """On the board: walls, rails, posts."""
     fixed: Mapping[str, Point] = {}
-    """Parts that stand beside the board and are bolted down, too."""
+    """Parts that stand next to the board and are bolted down, too."""
 
 
 class GeneratedAssembly(NamedTuple):

@@ -66,7 +66,7 @@ def _length(stations: Sequence[Station]) -> float:
 
 
 def place_stations(title: str, stations: Sequence[Station], rng: np.random.Generator) -> GeneratedAssembly:
-    """Stations beside each other on one board."""
+    """Stations next to each other on one board."""
     length = _length(stations)
     placed = list[Station]()
     x = _EDGE - length / 2

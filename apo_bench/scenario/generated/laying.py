@@ -13,15 +13,15 @@ _ARM = np.array([-420.0, 0.0])
 """Where the arm that comes with the benchmark stands; it reaches the table between two distances."""
 _REACH = (285.0, 640.0)
 _LEAST_ASIDE = 110.0
-"""Nothing waits between the arm and the site, where its links pass."""
+"""No part starts between the arm and the site, where its links pass."""
 _CENTER = 95.0
 _YAW_DEG = 20.0
 _SPREAD_X = (5.0, 30.0)
 _SPREAD_Y = (5.0, 40.0)
 _ROOM = np.array([36.0, 58.0])
-"""Between what waits: fingers close across y."""
+"""Between parts at their starts: fingers close across y."""
 _BESIDE = 45.0
-"""Between what waits and wherever the site may be."""
+"""Between parts at their starts and wherever the site may be."""
 _GRID = 6.0
 
 
@@ -35,7 +35,7 @@ class TableLayout(NamedTuple):
 
 
 def lay(made: GeneratedAssembly, rng: np.random.Generator) -> TableLayout:
-    """Draw where parts wait.
+    """Draw where parts start.
 
     Raises:
         RuntimeError: There is no room for all of them.

@@ -1,6 +1,6 @@
 """Stations whose parts each go onto a fixed one, or onto the part before.
 
-Sizes are such that fingers, 12 mm thick and 10 mm below their tips, pass beside what stands around. Lengths in mm.
+Sizes are such that fingers, 12 mm thick and 10 mm below their tips, pass next to other parts. Lengths in mm.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ _LOOSE = 0.5
 
 
 def hold(height: float) -> Point:
-    """Fingers beside a block of this height: well above its bottom, and never below it."""
+    """Fingers next to a block of this height: well above its bottom, and never below it."""
     return (0.0, 0.0, height - 2.0 if height < 22.0 else height - 10.0)
 
 
@@ -182,7 +182,7 @@ def make_covered(rng: np.random.Generator, i: str, size: int) -> Station:
 
 
 def make_carried(rng: np.random.Generator, i: str, size: int) -> Station:
-    """An axle that gets its ring in a stand beside the board, and then carries it to its bore; three parts."""
+    """An axle that gets its ring in a stand next to the board, and then carries it to its bore; three parts."""
     radius = draw_length(rng, 5, 7)
     parts, (first, second) = make_ringed_axle(rng, i, radius)
     stand = f"stand{i}"

@@ -21,7 +21,7 @@ DENSITY = (1.0, 25_000.0)
 LIGHTEST_KG = 1e-4
 HEAVIEST_KG = 1e6
 LARGEST_PART_BYTES = 4_000_000
-"""Of a part file, and of the file beside it."""
+"""Of a part file, and of the file next to it."""
 
 
 def is_name(text: str) -> bool:

@@ -13,7 +13,7 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
     """Mark these faces of a solid as fit, each moved into it by its undersize first.
 
     A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
-    the clearance. Outlines of faces beside keep what was there.
+    the clearance. Outlines of neighbouring faces keep what was there.
 
     A part that was drawn with play is made as thick as there is room by undersizes below 0: then its walls touch, and
     the clearance makes it as thin as it was drawn.

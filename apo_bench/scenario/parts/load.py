@@ -38,7 +38,7 @@ def load_part(given: str | Path, checked: bool = True) -> Solid:
 
     Of boxes alone it is their union, with faces named by the sites that lie on them; those without a site are called
     `auto_px_1`, ...: outward direction, and their number along it. Of other pieces, faces, volume, centroid and inertia
-    are those that `NAME.toml` beside it states. What does not come with the package is held against a mesh of the same
+    are those that `NAME.toml` next to it states. What does not come with the package is held against a mesh of the same
     pieces.
 
     Args:

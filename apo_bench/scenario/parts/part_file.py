@@ -44,7 +44,7 @@ class NamedSite:
 @final
 @dataclass(frozen=True, eq=False)
 class PartFile:
-    """What a part file says, with the file beside it."""
+    """What a part file says, with the file next to it."""
 
     path: Path
     pieces: tuple[Piece, ...]
@@ -52,7 +52,7 @@ class PartFile:
     marks: tuple[NamedSite, ...]
     """Of boxes alone."""
     stated: StatedPart | None
-    """What stands beside it; None of boxes alone."""
+    """What stands next to it; None of boxes alone."""
     density: float
     """[kg/m^3]."""
     model: "PartModel"
@@ -60,16 +60,16 @@ class PartFile:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the part is made of: its part file, the picture that this names, and the file beside it."""
+        """The files that the part is made of: its part file, the picture that this names, and the file next to it."""
         pictures = () if self.model.picture is None else (self.model.picture.file,)
         return self.path, *pictures, *(() if self.stated is None else (self.path.with_suffix(".toml"),))
 
 
 def read_part(path: Path) -> PartFile:
-    """Read a part file; once, as long as it and the file beside it stay as they are.
+    """Read a part file; once, as long as it and the file next to it stay as they are.
 
     Raises:
-        InputError: The file cannot be read, or is not one body of named pieces; or so the one beside it.
+        InputError: The file cannot be read, or is not one body of named pieces; or so the one next to it.
     """
     return _kept(path, _stamp(path), _stamp(path.with_suffix(".toml")))
 

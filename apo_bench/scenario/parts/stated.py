@@ -1,4 +1,4 @@
-"""Read the file beside a part file: faces and matter of the part."""
+"""Read the file next to a part file: faces and matter of the part."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -112,7 +112,7 @@ class StatedPart:
 
 
 def read_stated_part(path: Path) -> StatedPart:
-    """Read the file beside a part file.
+    """Read the file next to a part file.
 
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.

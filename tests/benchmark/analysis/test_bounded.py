@@ -42,16 +42,6 @@ def test_few_seeds_are_held_against_students_t() -> None:
     assert compute_threshold(1) == compute_threshold(0) == math.inf
 
 
-def test_without_spread_there_is_an_interval_and_without_seeds_nothing_is_known() -> None:
-    assert mean_interval(np.array([])) == (0.0, 1.0)
-    assert mean_interval(np.array([0.4])) == pytest.approx((0.0, 1.0), abs=1e-6)
-    low, high = mean_interval(np.ones(100))
-    assert (low, high) == pytest.approx((math.exp(-compute_threshold(100) / 200), 1.0), abs=1e-6)
-    low, high = mean_interval(np.zeros(50), -1.0, 1.0)
-    assert low == pytest.approx(-high)
-    assert 0.0 < high < 0.05
-
-
 @settings(max_examples=30, deadline=None)
 @given(steps=STEPS)
 def test_it_holds_the_mean_and_turns_round_with_the_values(steps: list[int]) -> None:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from apo_bench import InputError
 from apo_bench.benchmark.analysis import tabulate_calibration
 from apo_bench.benchmark.report.tables.methods import calibration_table
-from apo_bench.records import RECORD_FIELDS
-from apo_bench.records.run.run_folder import read_records
-from tests.benchmark.analysis.test_rates import row, write
+from tests.benchmark.analysis.test_rates import row
 
 
 def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
@@ -60,10 +56,3 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
     assert "| uncorrected | 0 | – | – | – | – | – | – |" in lines
     assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
-
-
-def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
-    folder = write(tmp_path / "new", [row()])
-    assert read_records(folder) == [dict.fromkeys(RECORD_FIELDS) | row()]
-    with pytest.raises(InputError, match="a record of schema 'apo-bench/row/8' was given"):
-        read_records(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))

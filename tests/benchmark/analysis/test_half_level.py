@@ -38,12 +38,6 @@ def test_outside_the_levels_it_is_censored(rates: tuple[float, ...], text: str, 
     assert (found.noise_mm, found.text, found.sure_text) == (None, text, surely)
 
 
-def test_where_all_turns_to_nothing_it_lies_in_the_middle_and_surely_between_both_levels() -> None:
-    found = made((1, 1, 1, 0, 0, 0, 0))
-    assert found.noise_mm == pytest.approx(np.sqrt(0.25 * 0.5))
-    assert (found.surely_over, found.surely_under, found.sure_text) == (0.25, 0.5, "0.25 to 0.5")
-
-
 @pytest.mark.parametrize("half", [0.4, 1.2, 2.5])
 def test_many_seeds_find_the_truth(half: float) -> None:
     found = made(tuple(expit(3 * np.log(half / np.array(LEVELS[1:])))), LEVELS[1:], 400)
@@ -71,12 +65,3 @@ def test_sure_bounds_stop_at_the_first_test_that_does_not_reject(right: list[int
     less = [binomtest(k, 30, alternative="less").pvalue <= 0.025 for k in right][::-1]
     assert over == (greater.index(False) if False in greater else len(greater))
     assert under == (less.index(False) if False in less else len(less))
-
-
-def test_only_levels_of_as_many_degrees_as_mm_are_on_a_curve() -> None:
-    rows = [row("contact", seed, seed > 2, noise_mm=x, noise_deg=x) for seed in range(8) for x in (0.5, 1.0)]
-    rows += [row("contact", 0, None, noise_mm=2.0, noise_deg=2.0), row("contact", 9, noise_mm=4.0, noise_deg=1.0)]
-    (found,) = half_levels(tally([*rows, row("oracle"), row("paper", 1)]))
-    assert (found.condition.method, found.largest, found.trials) == ("contact", 1.0, 16)
-    ranged = [row("contact", 0, noise="depth-camera", noise_mm=x, noise_deg=0.0) for x in (1.0, 2.0)]
-    assert [h.largest for h in half_levels(tally(ranged))] == [2.0]

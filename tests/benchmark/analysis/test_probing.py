@@ -10,7 +10,6 @@ import pytest
 from apo_bench.benchmark.analysis import group_by_setting, list_settings, tabulate_probing, tally
 from apo_bench.benchmark.analysis.paired import reference_condition
 from apo_bench.benchmark.report.tables.conditions import condition_table
-from apo_bench.benchmark.report.tables.methods import probing_table
 from tests.benchmark.analysis.test_rates import row
 
 
@@ -32,21 +31,6 @@ def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> 
     assert (found["std_mm"], found["std_deg"]) == pytest.approx((0.2, 0.05))
     assert found["drawn_mm"] == found["assumed_mm"] == pytest.approx(math.sqrt(3) * 0.5)
     assert found["drawn_deg"] == found["assumed_deg"] == pytest.approx(math.sqrt(3) * 0.1)
-
-
-@pytest.mark.parametrize(("stated", "told"), [("unknown", None), ("tool:1", (0.0, 0.0)), ("matched", (0.866, 0.173))])
-def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
-    (found,) = tabulate_probing([probe(0, 0.3, assumed_robot_error=stated)])
-    said = (found["assumed_mm"], found["assumed_deg"])
-    assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
-    (line,) = probing_table((found,)).lines
-    assert "0.87" in line
-    assert "0.30" in line
-    assert ("–" in line) == (told is None)
-
-
-def test_where_no_robot_felt_one_sentence_says_so() -> None:
-    assert probing_table(tabulate_probing([row("contact")])).markdown() == ["No robot probed."]
 
 
 def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None:

@@ -14,7 +14,6 @@ from pyarrow import parquet
 
 from apo_bench import InputError, TrialConfig
 from apo_bench.benchmark.datasets.making import make_dataset
-from apo_bench.benchmark.datasets.minari import write_minari
 
 REPLAYED = [
     TrialConfig(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
@@ -73,31 +72,6 @@ def test_lerobot_finds_every_frame_where_its_table_of_episodes_says(lerobot: dic
     assert parquet.ParquetFile(root / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 2
 
 
-def test_policies_of_lerobot_see_what_is_felt(lerobot: dict[str, Path]) -> None:
-    """They look at `environment_state`, never at a wrench."""
-    frames = columns(parquet.read_table(lerobot["insertions"] / "data"))
-    both = np.hstack([frames["observation.plan"], frames["observation.wrench"]])
-    np.testing.assert_array_equal(frames["observation.environment_state"], both)
-    assert np.abs(frames["observation.wrench"]).max() > 0.1
-
-
-def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobot: dict[str, Path]) -> None:
-    root = lerobot["replays"]
-    info = json.loads((root / "meta" / "info.json").read_text())
-    statistics = json.loads((root / "meta" / "stats.json").read_text())
-    assert statistics.keys() == info["features"].keys()
-    for name, each in statistics.items():
-        assert {len(each[key]) for key in each if key != "count"} == {info["features"][name]["shape"][0]}
-        assert each["count"] == [info["total_frames"]]
-        ordered = np.array([each[key] for key in ("min", "q01", "q10", "q50", "q90", "q99", "max")])
-        assert (np.diff(ordered, axis=0) >= 0).all()
-    schema = parquet.read_schema(root / "meta" / "tasks.parquet")
-    assert json.loads(schema.metadata[b"pandas"])["index_columns"] == ["task"]
-    tasks = parquet.read_table(root / "meta" / "tasks.parquet").to_pylist()
-    assert [task["task_index"] for task in tasks] == [0, 1]
-    assert tasks[0]["task"] == "A block on a block: repeat what was shown."
-
-
 def test_minari_finds_what_was_seen_around_every_action(minari: dict[str, Path], lerobot: dict[str, Path]) -> None:
     h5py = pytest.importorskip("h5py")
     for what, root in minari.items():
@@ -142,28 +116,6 @@ def test_every_episode_is_the_same_bit_for_bit_when_it_is_made_again(
     assert len(files) >= 3
     for path in files:
         assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes(), path
-
-
-def test_the_card_names_every_field(lerobot: dict[str, Path]) -> None:
-    for root in lerobot.values():
-        card = (root / "README.md").read_text()
-        info = json.loads((root / "meta" / "info.json").read_text())
-        assert all(f"| `{name}` |" in card for name in info["features"])
-        assert card.startswith("---\nlicense: apache-2.0\n")
-
-
-def test_trials_in_which_nothing_moves_are_left_out_and_said(tmp_path: Path) -> None:
-    trials = [TrialConfig("block_on_block", method="paper", noise_mm=40, noise_deg=40, seed=k) for k in range(3)]
-    said: list[str] = []
-    made, _ = make_dataset(trials, tmp_path / "data", "by hand", "lerobot", say=said.append)
-    assert made + len(said) == 3
-    assert all("is left out, as nothing moved: " in each for each in said)
-
-
-def test_without_h5py_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(InputError, match="needs the package h5py; install it with"):
-        write_minari([], None, tmp_path)  # type: ignore[arg-type]
 
 
 def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(

@@ -6,7 +6,6 @@ import re
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -60,51 +59,6 @@ def test_equal_counts_are_as_often_only_where_the_interval_is_narrow() -> None:
         assert f"`contact` succeeds in {seeds} of the same {seeds}: {words}" in said(rows)
 
 
-def test_a_difference_that_is_not_beyond_chance_is_told_so() -> None:
-    rows = [row("contact", i) for i in range(20)] + [row("uncorrected", i, i > 1) for i in range(20)]
-    assert "`contact` is 10.0 points ahead, which 20 seeds do not tell from chance (95 % interval -" in said(rows)
-
-
-def test_where_no_method_succeeds_it_says_so() -> None:
-    rows = [row(m, i, False) for m in ("contact", "uncorrected") for i in range(8)]
-    assert said(rows) == "No method succeeds in any trial: `uncorrected` in 0 of 8, `contact` in 0 of 8."
-
-
-def test_it_says_where_the_curve_falls_to_one_half() -> None:
-    rows = [
-        row(m, i, x < 2.0, noise_mm=x, noise_deg=x)
-        for x in (0.5, 1.0, 2.0, 4.0)
-        for m in ("contact", "paper")
-        for i in range(30)
-    ]
-    half, _ = summarise(rows).half_levels
-    words = f"Its success falls to one half at noise level {half.text} (surely: {half.sure_text})."
-    assert words in said(rows)
-
-
-@pytest.mark.parametrize(
-    ("h", "words"),
-    [
-        (9.0, "stays above one half up to noise level 4, the largest tried"),
-        (0.0, "is below one half from noise level 1, the smallest tried, on"),
-    ],
-)
-def test_levels_that_do_not_reach_one_half_say_so(h: float, words: str) -> None:
-    rows = [row("contact", i, x < h or i == 0, noise_mm=x, noise_deg=x) for x in (1.0, 4.0) for i in range(9)]
-    assert words in said(rows)
-
-
-def test_of_several_settings_the_worst_curve_is_told() -> None:
-    def at(scenario: str, h: float) -> list[dict[str, Any]]:
-        return [
-            row("contact", i, x < h, noise_mm=x, noise_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)
-        ]
-
-    assert "In each of 2 settings its success stays above one half up" in said(at("a", 9.0) + at("b", 9.0))
-    worst = "In the worst of 2 settings its success falls to one half at noise level 2 (surely: 1 to 4)."
-    assert worst in said(at("one", 9.0) + at("two", 2.0))
-
-
 def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
     rows = [row("contact", i) for i in range(5)] + [
         row("contact", i, False, contact_source="false-negative") for i in range(5)
@@ -112,11 +66,6 @@ def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
     assert said(rows).startswith("`contact` succeeds in 5 of 5 trials")
     assert "in 0 of 5" in said(rows[5:])
     assert said(rows[5:]).endswith("Correctors used the contacts `false-negative` here, not `given`.")
-
-
-@pytest.mark.parametrize("rows", [[row("oracle", i) for i in range(3)], [row("contact", i, None) for i in range(3)]])
-def test_where_nothing_counts_it_says_so(rows: list[dict[str, Any]]) -> None:
-    assert said(rows).startswith("No trial counts here")
 
 
 def columns(results: dict[tuple[Any, ...], bool]) -> Results:

@@ -12,7 +12,6 @@ import pytest
 from apo_bench import InputError
 from apo_bench.benchmark.analysis import compute_wilson_interval
 from apo_bench.benchmark.report.comparison.compare import compare
-from apo_bench.benchmark.report.comparison.text import comparison_form, in_words
 from apo_bench.cli import app as cli
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
@@ -71,53 +70,6 @@ def test_the_same_trials_are_met_whatever_the_fidelity(folders: tuple[Path, Path
     ]
 
 
-def test_trials_of_one_seed_count_once_where_independence_is_asked_for(tmp_path: Path) -> None:
-    ours = [row(method, seed, True) for method in ("paper", "contact") for seed in range(10)]
-    theirs = [row(r["method"], r["seed"], r["seed"] != 4) for r in ours]
-    a, _ = compare(write(tmp_path / "a", ours), write(tmp_path / "b", theirs)).agreements
-    assert [a[name] for name in ("same_verdict", "trials", "same_verdicts_in_all", "seeds")] == [18, 20, 9, 10]
-
-
-@pytest.mark.parametrize(
-    ("ours", "theirs", "words"),
-    [
-        ([True], [True], "1 trial is in both, 0 in the first alone, 0 in the second alone. Verdicts agree in 1 of 1"),
-        ([True] * 5, [False] * 5, "agree in 0 of 5 (0.00 %): 5 right in the first alone, 0 in the second alone. All"),
-        ([None] * 3, [None] * 3, "None of them counts: no demonstration was right itself."),
-        (
-            [True, None],
-            [True, True],
-            "agree in 1 of 2 (50.00 %): 0 right in the first alone, 0 in the second alone, 1 ",
-        ),
-    ],
-)
-def test_the_sentences_count_first(
-    ours: list[bool | None], theirs: list[bool | None], words: str, tmp_path: Path
-) -> None:
-    one, two = ([row("contact", i, x) for i, x in enumerate(side)] for side in (ours, theirs))
-    assert words in in_words(compare(write(tmp_path / "a", one), write(tmp_path / "b", two)))
-
-
-def test_one_run_file_that_is_not_there_is_one_difference(folders: tuple[Path, Path]) -> None:
-    (folders[1] / "run.json").unlink()
-    found = compare(*folders)
-    assert [tuple(line.values()) for line in found.differences] == [
-        ("run.json can be read", True, None),
-        ("records: fidelity", ["full"], ["near-contact"]),
-    ]
-    (folders[0] / "run.json").unlink()
-    assert [line["what"] for line in compare(*folders).differences] == ["records: fidelity"]
-
-
-def test_the_sides_change_places(folders: tuple[Path, Path]) -> None:
-    there = compare(*folders)
-    back = compare(*folders[::-1])
-    for ours, theirs in zip(there.agreements, back.agreements, strict=True):
-        assert ours["same_verdict"] == theirs["same_verdict"]
-        assert ours["right_in_first_alone"] == theirs["right_in_second_alone"]
-    assert [-(p["difference"] or 0.0) for p in there.conditions] == [p["difference"] or 0.0 for p in back.conditions]
-
-
 def test_the_command_writes_a_page_and_exits_with_0(
     folders: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,14 +91,6 @@ def test_the_command_writes_a_page_and_exits_with_0(
                 assert (noise, len(asked)) == ([], 1)
                 assert overflow(tab) <= 0
                 assert tab.title() == "one against two"
-
-
-def test_as_json_it_is_one_object(folders: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["compare", *map(str, folders), "--json"]) == 0
-    form = json.loads(capsys.readouterr().out)
-    assert form == json.loads(json.dumps(comparison_form(compare(*folders))))
-    assert form["agreements"][-1]["same_verdict_rate"] == 46 / 48
-    assert form["changed"][0]["second"]["verdict"] == "right"
 
 
 def test_what_cannot_be_compared_is_refused_in_one_sentence(

@@ -27,12 +27,7 @@ EVIL = """from pathlib import Path
 Path("touched").write_text("evil code ran")
 raise SystemExit
 """
-NAMES = (
-    {"arm": "evil:arm"},
-    {"method": "evil:correct"},
-    {"noise": "evil:noise"},
-    {"contact_source": "evil:told"},
-)
+NAMES = ({"arm": "evil:arm"}, {"method": "evil:correct"}, {"noise": "evil:noise"}, {"contact_source": "evil:told"})
 DANGEROUS = (
     *('<script>alert("1")</script>', "$(touch x)", "; rm -r .", "`touch x`", "'; touch x; '", "-x", "a b", "&&"),
     *("[/red]", "--video=x.mp4"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,9 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.report.report import Report, report
-from apo_bench.cli.app import main
-from apo_bench.errors import InputError
-from apo_bench.io import write_columns
 from tests import pages
 from tests.benchmark.analysis.test_rates import row, write
-from tests.browser import browser, opened, overflow
+from tests.browser import browser, opened
 
 EVIL = '<script>document.title="broken"</script>"><img src=x onerror="document.title=1">'
 METHODS = ("uncorrected", "contact", "paper", "mine:<b>correct</b>")
@@ -120,29 +116,6 @@ def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any
         assert (said, len(asked)) == ([], 1)
 
 
-@pytest.mark.parametrize(("width", "dark"), [(390, False), (1280, True)])
-def test_nothing_is_wider_than_the_window(made: Report, chromium: Any, width: int, dark: bool) -> None:
-    with opened(chromium, made.page, width, dark, "#cell-1") as (page, said, _):
-        page.locator(".trials tbody tr").first.wait_for()
-        page.evaluate("document.querySelectorAll('details').forEach((box) => { box.open = true; })")
-        assert overflow(page) <= 0
-        paper, ink = page.evaluate(
-            "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
-        )
-        bright = [sum(map(int, re.findall(r"\d+", color)[:3])) for color in (paper, ink)]
-        assert (bright[0] < bright[1]) == dark
-        assert said == []
-
-
-def test_only_what_was_lost_is_replayed_in_a_process_of_its_own(tmp_path: Path) -> None:
-    lost = {"failure_stage": "worker", "failure_code": "worker_died", "success": False}
-    some = [row("paper", i, i not in (1, 2)) | (lost if i in (1, 2) else {}) for i in range(4)]
-    kept = pages.trials(report(write(tmp_path / "run", some)).page)
-    words = [kept["words"]["command"][i] for i in kept["columns"]["command"]]
-    alone = [seed for seed, said in zip(kept["columns"]["seed"], words, strict=True) if "--trial-limit 600" in said]
-    assert alone == [1, 2]
-
-
 def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
     kept = pages.trials(made.page)
     assert kept["ends"][-1] == len(rows())
@@ -154,21 +127,6 @@ def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
         assert verdicts.count("excluded") == int(cell["excluded"])
         assert kept["columns"]["seed"][first:end] == sorted(kept["columns"]["seed"][first:end])
         first = end
-
-
-def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
-    page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
-    for sentence in (
-        "The noise level did not vary.",
-        "No method shares a condition with uncorrected or paper",
-        "contact succeeds in 3 of 3 trials (100.0 %). 3 seeds are too few",
-        "No picture: None was asked for",
-        "No method that corrects had a plan",
-        "No method used detected contacts.",
-        "There is no timing.jsonl",
-        "There is no run.json",
-    ):
-        assert sentence in page
 
 
 def test_tables_are_the_same_as_parquet(made: Report) -> None:
@@ -188,45 +146,6 @@ def test_tables_are_the_same_as_parquet(made: Report) -> None:
     assert sum(x is True for x in kept["success"].to_pylist()) == sum(r["success"] is True for r in rows())
 
 
-def test_without_pyarrow_tables_are_csv_alone_and_it_is_said(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    both = report(write(tmp_path / "run", rows()))
-    kept = {path.name: path.read_bytes() for path in both.tables.values()}
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    made = report(tmp_path / "run")
-    assert {path.suffix for path in (tmp_path / "run" / "tables").iterdir()} == {".csv"}
-    assert {path.name: path.read_bytes() for path in made.tables.values()} == kept
-    assert ".parquet" not in made.page.read_text(encoding="utf-8")
-    assert main(["report", str(tmp_path / "run"), "--pictures", "0"]) == 0
-    assert ".parquet needs the package pyarrow" in capsys.readouterr().out
-    with pytest.raises(InputError, match="a Parquet table needs the package pyarrow; install it with: pip install"):
-        write_columns(["a"], [[1]], tmp_path / "a.parquet")
-
-
-def test_the_same_rows_in_another_order_make_the_same_tables_and_commands(made: Report, tmp_path: Path) -> None:
-    other = report(write(tmp_path / "run", rows()[::-1]))
-    for name, path in made.tables.items():
-        if name not in ("times", "confusion"):
-            assert path.read_bytes() == other.tables[name].read_bytes()
-    assert pages.trials(made.page)["words"]["command"] == pages.trials(other.page)["words"]["command"]
-
-
-def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from apo_bench.cli import app as cli
-
-    folder = write(tmp_path / "run", [row("contact", 0), row("contact", 1, scenario="two | and bars")])
-    for number in ("-1", "101", "many"):
-        assert cli.main(["report", str(folder), "--pictures", number]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-    (folder / "tables").write_text("in the way", encoding="utf-8")
-    assert cli.main(["report", str(folder)]) == 2
-    assert "cannot be written" in capsys.readouterr().err
-    (folder / "tables").unlink()
-    assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
-    assert "two | and bars" in pages.words(folder / "report.html")
-
-
 @pytest.mark.parametrize(
     "trials",
     [
@@ -237,11 +156,8 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
             row("contact", 0, contact_source="false-negative"),
             row("contact", 0, grasp="weld", fidelity="near-contact"),
         ],
-        [row("contact", 0, noise_mm=x, noise_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
-        [row(f"mine:m{k}") for k in range(20)],
-        [row("contact", 2**53 - 1), row("contact", 0, noise_mm=None, noise_deg=None, human_error_scale=None)],
     ],
-    ids=["excluded", "oracle", "conditions", "pairs of levels", "methods", "measured beside"],
+    ids=["excluded", "oracle", "conditions"],
 )
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))

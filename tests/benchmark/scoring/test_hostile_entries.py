@@ -12,7 +12,6 @@ from msgspec import to_builtins
 
 from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, score_of, write_entry
 from apo_bench.benchmark.scoring.leaderboard import read_entries
-from apo_bench.benchmark.scoring.track import read_track
 from apo_bench.cli.app import main
 
 NAMES = (
@@ -133,12 +132,3 @@ def test_an_entry_of_another_version_of_a_track_is_left_out_and_the_many_stay(tm
     assert [e.name for e in entries] == ["one", "two"]
     assert len(left_out) == 1
     assert "a.json: the entry is of another version of the track mine" in left_out[0]
-
-
-def test_of_equally_many_versions_that_of_the_package_stays(tmp_path: Path) -> None:
-    track = read_track("tight")
-    write_entry(entry("alien", track="tight"), tmp_path / "a.json")
-    write_entry(entry("ours", track="tight", file=track.hash), tmp_path / "b.json")
-    assert [e.name for e in read_entries(tmp_path)[0]] == ["ours"]
-    (tmp_path / "b.json").unlink()
-    assert [e.name for e in read_entries(tmp_path)[0]] == ["alien"]

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,6 @@ from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, read_run
-from apo_bench.trial.endings import record_lost_trial, record_misbehaviour
 from apo_bench.trial.fingerprint import versions
 
 CODE = """
@@ -75,7 +73,7 @@ def grid(*methods: str, **more: Any) -> SweepConfig:
     return SweepConfig(("block_on_block",), (1.0,), (0.0,), named, **{"trials": 1, "fidelity": "near-contact"} | more)
 
 
-MANY = grid("uncorrected", "raises", "dies", "nonsense", trials=2)
+MANY = grid("uncorrected", "raises", "dies", "nonsense")
 ENDS = {
     "uncorrected": (None, None),
     "unruly:raises": ("correct", "raised"),
@@ -97,11 +95,11 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 
 def test_rows_are_the_same_bytes_whoever_makes_them_and_a_death_costs_one_trial(two: list[Any], tmp_path: Path) -> None:
     assert endings(two) == {method: ENDS[method] for method in MANY.method}
-    assert len(two) == 8
+    assert len(two) == 4
     one = run_sweep(MANY, tmp_path / "one", workers=1)
     assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, two))
     alive = [row for row in two if row["failure_stage"] != "worker"]
-    here = run_sweep(grid("uncorrected", "raises", "nonsense", trials=2), tmp_path / "here")
+    here = run_sweep(grid("uncorrected", "raises", "nonsense"), tmp_path / "here")
     assert sorted(map(json.dumps, here)) == sorted(map(json.dumps, alive))
     timing = [json.loads(text) for text in (tmp_path / "one" / "timing.jsonl").read_text().splitlines()]
     assert len(timing) == len(one)
@@ -135,17 +133,7 @@ def test_a_trial_that_hangs_is_ended_at_its_limit_and_the_others_go_on(
     assert replayed(late, capsys, limits) == json.loads(json.dumps(late))
 
 
-TALKS = [
-    "run",
-    "block_on_block",
-    "--human-error-scale",
-    "0",
-    "--fidelity",
-    "near-contact",
-    "--method",
-    "unruly:talks",
-    "--json",
-]
+TALKS = shlex.split("run block_on_block --human-error-scale 0 --fidelity near-contact --method unruly:talks --json")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
@@ -161,20 +149,6 @@ def test_a_row_on_standard_output_stands_there_alone(
         assert words in err
 
 
-def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
-    spec = TrialConfig("block_on_block", method="paper", seed=4)
-    died = record_lost_trial(spec, "abc", "worker_died")
-    late = record_lost_trial(spec, "abc", "time_limit")
-    raised = record_misbehaviour(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
-    assert list(died) == list(late) == list(raised)
-    assert died["config_hash"] == raised["config_hash"]
-    assert (died["success"], died["demonstration"], died["failure_stage"]) == (False, None, "worker")
-    assert died["sentence"] == "the process that ran the trial died"
-    assert (late["failure_code"], raised["demonstration"]) == ("time_limit", "ok")
-    assert raised["sentence"].startswith("it raised <thing at 0x...>; xxx")
-    assert len(raised["sentence"]) == 1000
-
-
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
     batch = (TrialConfig("block_on_block", method="uncorrected"),)
     other = SweepInputs({"block_on_block": "0123456789abcdef"}, versions())
@@ -184,20 +158,6 @@ def test_a_worker_with_other_code_or_packages_refuses() -> None:
         Worker(SweepInputs({}, versions() | {"mujoco": "1.2.3"}), {})
     with pytest.raises(InputError, match="has other files"):
         pool.run_locally([batch], other, 1, 60.0, lambda row, timing: None)
-
-
-@dataclass(frozen=True)
-class Deadly:
-    """Ends the process that unpacks it."""
-
-    def __reduce__(self) -> Any:
-        return os._exit, (5,)
-
-
-def test_processes_that_cannot_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "folder_of_own_modules", Deadly)
-    with pytest.raises(RuntimeError, match="worker processes end before they have begun a trial"):
-        pool.run_locally([(TrialConfig("block_on_block"),)], SweepInputs({}, {}), 1, 60.0, lambda row, timing: None)
 
 
 def count(out: Path) -> int:
@@ -213,20 +173,9 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
 
 
 def started(out: Path, levels: str) -> subprocess.Popen[str]:
-    asked = [
-        "sweep",
-        "block_on_block",
-        "--human-error-scale",
-        "0",
-        "--out",
-        str(out),
-        "--workers",
-        "2",
-        "--noise-level",
-        levels,
-    ]
+    asked = shlex.split(f"sweep block_on_block --human-error-scale 0 --workers 2 --noise-level {levels} --out")
     return subprocess.Popen(
-        [sys.executable, "-m", "apo_bench.cli.app", *asked, "--method", "unruly:slow", "--trials", "1"],
+        [sys.executable, "-m", "apo_bench.cli.app", *asked, str(out), "--method", "unruly:slow", "--trials", "1"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

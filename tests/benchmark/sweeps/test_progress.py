@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from contextlib import suppress
-
 import pytest
 
 from apo_bench.benchmark.sweeps.progress import progress
@@ -21,20 +17,3 @@ def test_without_a_terminal_a_line_a_minute_is_said(
             count()
     lines = ("3 of 10 trials in 1 min, about 2 min to go\n", "5 of 10 trials in 2 min, about 2 min to go\n")
     assert capsys.readouterr() == ("", "".join(lines))
-
-
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a terminal")
-def test_a_terminal_sees_how_many_trials_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    ours, theirs = os.openpty()
-    monkeypatch.setenv("TERM", "xterm")
-    with os.fdopen(theirs, "w") as terminal:
-        monkeypatch.setattr(sys, "stderr", terminal)
-        with progress(3) as count:
-            count()
-    seen = ""
-    with suppress(OSError):  # how a terminal that nobody writes to any more ends
-        while text := os.read(ours, 100_000):
-            seen += text.decode()
-    os.close(ours)
-    assert "1/3" in seen
-    assert "trials" in seen

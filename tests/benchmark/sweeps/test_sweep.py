@@ -104,11 +104,6 @@ def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
-def test_grids_whose_seeds_lie_far_apart_are_laid_out_at_once() -> None:
-    far = [replace(SPEC, trials=2, seed=seed, method=("uncorrected",)) for seed in (10**12, 0)]
-    assert [unit[0].seed for unit in units(far, load_all(far))] == [0, 1, 10**12, 10**12 + 1]
-
-
 def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path: Path) -> None:
     rows = runner.run_sweep(SPEC, tmp_path / "new" / "run", command="apo-bench sweep ...")
     assert len(rows) == ROWS
@@ -158,13 +153,7 @@ def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_pa
         runner.run_sweep(SPEC, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"noise_level": (0.0, 2.0)}, "grid: noise_level was"),
-        ({"seed": 11}, "grid: seed was 10, now 11"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [({"seed": 11}, "grid: seed was 10, now 11")])
 def test_a_folder_of_another_sweep_is_refused(
     change: dict[str, Any], words: str, counted: Counter[str], tmp_path: Path
 ) -> None:
@@ -192,10 +181,8 @@ def test_rows_made_by_other_versions_are_refused(counted: Counter[str], tmp_path
     [
         ({"scenario": ()}, "no scenario was given"),
         ({"noise_level": (float("nan"),)}, "noise level must be a number from 0 to 50, got nan"),
-        ({"human_error_scale": (99.0,)}, "human error scale must be a number from 0 to 10, got 99"),
         ({"method": ("oracle", "papr")}, "did you mean 'paper'"),
         ({"trials": 0}, "trials must be a whole number from 1"),
-        ({"seed": -3}, "seed must be a whole number from 0"),
         ({"pose_source": ("noise-model", "telescope")}, "telescope"),
     ],
 )
@@ -208,8 +195,6 @@ def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: s
     ("change", "words"),
     [
         ({"scenario": ("stick_in_towr",)}, "did you mean 'stick_in_tower'"),
-        ({"noise": ("isotropc",)}, "did you mean 'isotropic'"),
-        ({"contact_source": ("shifted:0",)}, "a size above 0 and up to 50 mm is allowed: shifted:3"),
         ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
         ({"method": ("json:nothing",)}, "unknown corrector in module json 'nothing'"),
     ],
@@ -218,40 +203,6 @@ def test_names_are_checked_before_a_folder_is_made(change: dict[str, Any], words
     with pytest.raises(InputError, match=words):
         runner.run_sweep(replace(SPEC, **change), tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
-    from apo_bench.resources import folder
-
-    copy = tmp_path / "stick_in_tower.toml"
-    copy.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
-    with pytest.raises(InputError, match="two scenarios called 'stick_in_tower'"):
-        runner.run_sweep(replace(SPEC, scenario=("stick_in_tower", str(copy))), tmp_path / "run")
-
-
-def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp_path: Path) -> None:
-    spec = replace(
-        SPEC,
-        pose_source=("noise-model", "depth-camera"),
-        noise=("isotropic", "camera"),
-        method=("oracle", "uncorrected"),
-    )
-    loaded = load_all([spec])
-    trials = [trial for unit in units([spec], loaded) for trial in unit]
-    seen = Counter(
-        (t.pose_source, t.noise, t.noise_deg > 0.0) for t in trials if t.method == "uncorrected" and t.noise_mm > 0.0
-    )
-    assert set(seen) == {
-        ("noise-model", "isotropic", True),
-        ("noise-model", "camera", True),
-        ("depth-camera", "depth-camera", False),
-    }
-    assert len(set(seen.values())) == 1
-    assert {(t.pose_source, t.noise) for t in trials if t.method == "oracle"} == {("noise-model", "isotropic")}
-    rows = runner.run_sweep(spec, tmp_path / "pose_source")
-    assert len(rows) == len(trials) == len({get_record_key(row) for row in rows})
-    per_careless = {(t.scenario, t.seed, t.human_error_scale, t.pose_source) for t in trials}
-    assert counted["demonstration"] == len(per_careless)
 
 
 def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str], tmp_path: Path) -> None:
@@ -272,20 +223,3 @@ def test_several_grids_make_one_folder(counted: Counter[str], tmp_path: Path) ->
     with pytest.raises(InputError, match="it had 2 grids, now 1"):
         runner.run_sweep(SPEC, tmp_path)
     assert runner.run_sweep([replace(SPEC, trials=4), further], tmp_path)[: len(rows)] == rows
-
-
-def test_a_file_and_flags_make_the_same_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The flags find nothing left to do in the folder of the file; another sweep would be refused there."""
-    from apo_bench.cli.app import main
-
-    (tmp_path / "grid.toml").write_text(
-        'scenario = ["block_on_block"]\nnoise_level = [40, 0]\nhuman_error_scale = [0]\nmethod = ["snap"]\n'
-        "trials = 9\nseed = 2\n"
-    )
-    flags = ["block_on_block", "--noise-level", "40,0", "--human-error-scale", "0", "--method", "snap", "--seed", "2"]
-    written = []
-    for asked in ([str(tmp_path / "grid.toml")], flags):
-        assert main(["sweep", *asked, "--trials", "1", "--workers", "1", "--out", str(tmp_path / "run")]) == 0
-        assert "trials.jsonl" in capsys.readouterr().out
-        written.append((tmp_path / "run" / "trials.jsonl").read_bytes())
-    assert written[0] == written[1]

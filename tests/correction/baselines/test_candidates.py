@@ -50,13 +50,6 @@ def test_candidates_of_the_paper(name: str) -> None:
     assert chosen(scenes.ALL[name]().assembly) == ()
 
 
-def test_a_stable_object_connects_nothing() -> None:
-    assembly = scenes.fixture().assembly
-    assert chosen(assembly, "cube-table 4") == (4,)
-    assert chosen(assembly, "castle1-table") == (5, 3, 2, 1)
-    assert chosen(scenes.pockets().assembly, "cube1-table 4") == (4,)
-
-
 @given(st.integers(0, 10**6))
 @settings(max_examples=30, deadline=None)
 def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -87,27 +85,6 @@ def test_the_schedule_ends_at_the_goals(name: str, level: float) -> None:
         assert sorted(done) == list(range(len(goals)))
         assert_array_equal(np.array([done[k] for k in sorted(done)]), found.poses)
         assert is_rigid(found.poses).all()
-
-
-def test_before_an_operation_is_seen_it_changes_nothing() -> None:
-    """Whatever comes later, the steps before it are corrected and tried in the same way."""
-    scene, goals = scenes.human_error("subassembly_on_castles", 2.0)
-    goals = scenes.noisy(goals, np.random.default_rng(1), 1.0, 1.0)
-    seen = scenes.seen(scene, goals)
-    n = 4
-    early = replace(
-        seen,
-        assembly=scene.assembly.first(n),
-        poses=goals[:n],
-        covariance=seen.covariance[:n],
-        observed=seen.observed[:n],
-    )
-    whole = paper_track(seen)
-    part = paper_track(early)
-    assert part.schedule == whole.schedule[: len(part.schedule)]
-    assert whole.step_poses is not None
-    assert_array_equal(part.step_poses, whole.step_poses[: len(part.schedule)])
-    assert part.tried == tuple(one for one in whole.tried if one.step < n)
 
 
 def test_no_set_suffices() -> None:

@@ -47,11 +47,3 @@ def test_a_part_is_where_its_factors_put_it(seed: int) -> None:
         assert_allclose(T[i], tip @ slip @ held, atol=1e-14)
         others = [k for k in (0, 1) if k != grasp]
         assert not any(D[i, :, grasp_in(JOINTS, k)].any() for k in others)
-
-
-def test_hand_and_eye_turn_about_the_middle() -> None:
-    middle = np.array([0.4, -0.2, 0.1])
-    E = hand_eye_displacement(np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3]), middle)
-    assert_allclose(pose.apply(E, middle[None])[0], middle, atol=1e-15)
-    E = hand_eye_displacement(np.array([1e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0]), middle)
-    assert_allclose(E, pose.at((1e-3, 2e-3, 3e-3)), atol=1e-15)

@@ -94,17 +94,3 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     claimed_m = (own.gap_before_m, own.gap_after_m)
     measured_m = (wrapped.gap_before_m, wrapped.gap_after_m)
     assert measured_m == pytest.approx(claimed_m, rel=0, abs=1e-15)  # compiled and not: rounding
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"sentence": None}, "sentence of Correction must be a text, got None"),
-        ({"sentence": "a\nb"}, "as its sentence"),
-        ({"dropped": ("R99",)}, "returned 'R99' in `dropped`; return a tuple of relations, such as 'R1'"),
-    ],
-)
-def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError) as refused:
-        correct(seen(), lambda seen: lying(seen, **changed))
-    assert message in str(refused.value)

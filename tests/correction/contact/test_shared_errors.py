@@ -7,20 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench import (
-    Demonstration,
-    InputError,
-    Observation,
-    correct,
-    draw_layout,
-    explain,
-    load_scenario,
-)
-from apo_bench.assembly import SharedError
+from apo_bench import Demonstration, Observation, correct, draw_layout, load_scenario
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.viz.dof_text import shared_lines
 
 
 def shown(name: str, seed: int) -> Demonstration:
@@ -67,40 +56,3 @@ def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str
         covered.append(contains_truth(observation, made, truth))
     assert sum(covered) >= 28.5 - 4 * np.sqrt(30 * 0.95 * 0.05)
     assert np.mean(p) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 30))
-
-
-def test_the_test_and_the_regions_are_those_of_the_tails() -> None:
-    """Of 50 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
-    p = []
-    covered = []
-    for seed in range(50):
-        observation, truth = seen(
-            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5
-        )
-        made = correct(observation, "contact")
-        p.append(made.test.p_value)
-        covered.append(contains_truth(observation, made, truth))
-    assert abs(np.mean(np.array(p) < 0.1) - 0.1) < 4 * np.sqrt(0.09 / 50)
-    assert abs(np.mean(covered) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 50)
-
-
-def test_what_is_known_of_the_camera_is_said() -> None:
-    """The estimate of the shared twist is within its own posterior: squared lengths of 15 are chi-square of six."""
-    square = []
-    for seed in range(15):
-        observation, truth = seen("bias-view", seed=seed)
-        found = explain(observation, correct(observation, "contact").poses)
-        (one,) = found.shared
-        P = one.error.frame
-        true = pose.log(pose.inverse(P) @ observation.poses[0] @ pose.inverse(truth[0]) @ P)
-        off = one.twist - true
-        square.append(off @ np.linalg.solve(one.covariance + np.diag(np.repeat([1e-4, 2e-3], 3) ** 2), off))
-    assert np.mean(square) < 12.0
-    assert any("camera: off by (" in sentence for sentence in shared_lines(found))
-
-
-def test_a_shared_error_above_its_covariance_is_refused() -> None:
-    observation, _ = seen("isotropic", level=1.0)
-    large = SharedError("camera", (0, 1), np.diag(np.repeat([0.1, 1.0], 3) ** 2), np.eye(4))
-    with pytest.raises(InputError, match="the shared errors 'camera' are larger than the covariances"):
-        correct(replace(observation, shared=(large,)), "contact")

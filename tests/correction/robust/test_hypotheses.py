@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench import Demonstration, correct, draw_layout, load_scenario
+from apo_bench import correct
 from apo_bench.assembly import OutlierModel, compute_placements
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.camera import Camera
-from apo_bench.perception.observation.noise import NoiseLevel, make_noise
-from apo_bench.perception.observation.observing import observe
-from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
-from apo_bench.trial.pose_error import goal_errors
-from tests.correction.robust.test_reobservations import Again, at_the_same_place
-from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
+from tests.correction.robust.test_robust import fixed_error_mm, look, shown
 
 TOWER = "stick_in_tower"
 
@@ -81,60 +76,3 @@ def test_operations_in_a_row_that_are_displaced_alike_are_displaced_together(see
     found = correct(replace(observation, poses=goals))
     assert "seen displaced together: operation 3, 4, 5" in found.sentence
     assert found.left_out == found.dropped == ()
-
-
-def test_two_looks_that_repeat_an_error_are_no_proof():
-    """Contacts contradict both, and are believed."""
-    k = 1
-    wrong = astray(look("carried_bridge", 2), k)
-    second = at_the_same_place("carried_bridge", 2, 0)
-    again = seen_at(second, k, wrong.poses[k] @ pose.exp(np.repeat([3e-4, 3e-3], 3)))
-    for repeat, believed in ((0.8, False), (0.2, False)):
-        model = OutlierModel(repeat=repeat)
-        found = correct(replace(wrong, outliers=model), reobserve=Again(again))
-        assert found.ok
-        assert (k not in found.left_out) == believed
-        assert found.dropped == ()
-        assert fixed_error_mm("carried_bridge", 2, found) < 0.35
-
-
-def test_noise_that_is_twice_what_is_stated_is_noticed_and_nothing_is_left_out():
-    scales = []
-    covered = []
-    for seed in range(20):
-        observation = look("vanished_fixture", seed, 2.0)
-        stated = replace(observation, covariance=observation.covariance / 4.0)
-        found = correct(stated)
-        assert found.left_out == found.dropped == ()
-        scales.append(found.noise_scale)
-        covered.append(contains_truth(stated, found, shown("vanished_fixture", seed)[2].poses))
-        if found.noise_scale > 1.5:
-            assert "as noisy as stated" in found.sentence
-    assert 1.7 < np.median(scales) < 2.3
-    assert np.mean(covered) > 0.8
-
-
-def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
-    """A contact too many in ten operations: one of the sets that are tried leads the compiled solver to no number."""
-    scenario = load_scenario("gearbox")
-    layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
-    first = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, np.zeros((10, 6, 6)))
-    seen = make_noise("isotropic", NoiseLevel(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
-    wrong = replace_contacts(seen, make_contacts("false-positive"), layout.poses, np.random.default_rng([13, 9]))
-    found = correct(wrong)
-    assert found.ok
-    assert found.dropped
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_all_operations_may_be_false_together(seed):
-    """Bracket and shaft are seen in each other's place: no set that leaves one of them believed agrees."""
-    scenario = load_scenario("shaft_through_brackets")
-    layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
-    nothing = np.zeros((2, 6, 6))
-    truth = Demonstration(scenario.assembly, layout.start, layout.poses, layout.start, nothing)
-    observation = observe(truth, make_noise("isotropic", NoiseLevel(1.0, 1.0)), np.random.default_rng(seed))
-    found = correct(replace(observation, poses=observation.poses[::-1]), "contact-robust")
-    assert found.ok
-    assert found.sentence.endswith("seen in each other's place: operation 1, 2")
-    assert goal_errors(scenario.assembly, layout.start, layout.poses, found.poses)[0] < 0.01

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench import InputError, correct
+from apo_bench import correct
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
@@ -74,8 +73,3 @@ def test_an_operation_of_which_nothing_is_told_is_asked_for():
     assert correct(missed, "contact-robust", again).ok
     assert again.asked == [(0,)]
     assert correct(missed, "contact-robust", Again()).status == "not_seen"
-
-
-def test_anything_but_a_reobserver_is_refused():
-    with pytest.raises(InputError, match="reobserve of correct must be a Reobserver or None"):
-        correct(look("block_on_block", 1), "contact-robust", 2)

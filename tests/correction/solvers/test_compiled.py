@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -16,8 +14,6 @@ from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses
-from apo_bench.correction.solvers.linear_step import DenseStep
-from apo_bench.correction.solvers.whitened import whiten_twists
 from apo_bench.geometry import Array, pose
 from tests.correction.test_many import check_same
 
@@ -102,38 +98,3 @@ def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
         assert (made.covariance is None) == (alone.covariance is None)
         assert made.trace == alone.trace
         assert made.test == alone.test
-
-
-@pytest.fixture
-def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    kernels.kernels.cache_clear()
-    monkeypatch.setitem(sys.modules, "numba", None)
-    yield
-    kernels.kernels.cache_clear()
-
-
-@pytest.mark.usefixtures("no_numba")
-def test_without_numba_contact_is_not_compiled() -> None:
-    one = observed("bridge_cycle", 2.0, 1.0, 0)
-    uncompiled = correct(one, ContactCorrector(compiled=False))
-    assert np.array_equal(correct(one, "contact").poses, uncompiled.poses)
-    np.testing.assert_allclose(correct_many([one], contact)[0].poses, uncompiled.poses, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 3.0])
-def test_kernels_run_as_they_stand(turn: float) -> None:
-    """Uncompiled, with goals turned little and far: what differs from the twins is rounding alone."""
-    system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
-    rng = np.random.default_rng(0)
-    xi = rng.standard_normal((1, len(goals), 6))
-    xi[..., 3:] *= turn / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
-    z = whiten_twists(L, xi)
-    rows = np.arange(1)
-    mu = np.array([1e-3])
-    plain, looped = (DenseStep(system, goals[None], L[None], None, some) for some in (None, kernels.PLAIN))
-    for step in (plain, looped):
-        step.linearise(z, rows)
-    for name in ("T", "B", "e", "Jt", "sizes"):
-        np.testing.assert_allclose(getattr(looped, name), getattr(plain, name), rtol=1e-12, atol=1e-12)
-    for expected, actual in zip(plain.change(z, mu, rows), looped.change(z, mu, rows), strict=True):
-        np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-9)

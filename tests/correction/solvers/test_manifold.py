@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import least_squares
 
 from apo_bench.assembly import build_contact_equations
 from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
@@ -75,42 +74,6 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
         assert_allclose(found.poses, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
         truth = correction(seen, scene.goals, L)
         assert found.z @ found.z <= truth @ truth + 1e-9
-
-
-def test_the_derivative_is_one() -> None:
-    """J of the result against differences of e by z."""
-    scene = scenes.stick_in_tower()
-    rng = np.random.default_rng(0)
-    L = crooked(3, rng)
-    seen = twisted(scene.goals, L, rng)
-    system = system_of(scene, seen)
-    found = find_nearest_poses(system, seen, L)
-    by = 1e-4
-    e = [
-        [system.residual(seen @ pose.exp((L @ (found.z + sign * step).reshape(3, 6, 1))[..., 0])) for sign in (1, -1)]
-        for step in by * np.eye(18)
-    ]
-    numeric = np.array([(plus - minus) / (2 * by) for plus, minus in e])
-    assert_allclose(found.Jt, numeric, rtol=0, atol=1e-6 * np.abs(numeric).max())
-
-
-def test_ever_stiffer_springs_lead_to_the_same() -> None:
-    """Redundant contacts as penalties, made ten times stiffer again and again, started from the answer before."""
-    scene = scenes.stick_in_tower()
-    rng = np.random.default_rng(11)
-    L = crooked(3, rng)
-    seen = twisted(scene.goals, L, rng)
-    plain = build_contact_equations(scene.assembly, scene.start, seen)
-
-    def pulls(z: Array, soft_m: float) -> Array:
-        return np.concatenate([z, plain.residual(seen @ pose.exp((L @ z.reshape(3, 6, 1))[..., 0])) / soft_m])
-
-    z = np.zeros(18)
-    for soft_m in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
-        z = least_squares(pulls, z, args=(soft_m,), xtol=1e-15, ftol=1e-15, gtol=1e-12).x
-    found = find_nearest_poses(system_of(scene, seen), seen, L)
-    assert found.z @ found.z == pytest.approx(z @ z, rel=1e-5)
-    assert_allclose(found.z, z, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])

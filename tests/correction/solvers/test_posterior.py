@@ -15,12 +15,7 @@ from apo_bench import Correction, Observation, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import find_nearest_poses
-from apo_bench.correction.solvers.posterior import (
-    compute_freedom,
-    compute_jacobian_rank,
-    compute_projections,
-    settle_basis,
-)
+from apo_bench.correction.solvers.posterior import compute_freedom, compute_jacobian_rank
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -51,25 +46,6 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     J = jacobian(system, found)
     assert np.abs(J @ known.free).max() <= 1e-6 * np.abs(J).max()
     assert np.abs(found.z @ known.free).max() <= 1e-6
-
-
-def test_observations_together_have_the_rank_and_the_projection_of_each() -> None:
-    """Also where the columns that span the first do not span another one, or one has fewer, or none."""
-    rng = np.random.default_rng(3)
-    J = rng.standard_normal((6, 8, 12))
-    J[0, 4:] = rng.standard_normal((4, 4)) @ J[0, :4]
-    J[1, 4:] = rng.standard_normal((4, 4)) @ J[1, :4]
-    J[2, :4] = rng.standard_normal((4, 3)) @ J[2, 4:7]
-    J[3, 1] = J[3, 0] * (1.0 + 1e-15)
-    J[4] = 0.0
-    rank, P = compute_projections(np.swapaxes(J, 1, 2))
-    assert rank == [4, 4, 4, 7, 0, 8]
-    assert P is not None
-    for each, free, fixed in zip(J, P, rank, strict=True):
-        N = np.linalg.svd(each)[2][fixed:]
-        assert_allclose(free, N.T @ N, rtol=0, atol=1e-9)
-    alone = [compute_projections(np.swapaxes(each, 0, 1)[None])[0][0] for each in J]
-    assert alone == rank
 
 
 @pytest.mark.parametrize(("name", "correlated"), [("stick_in_tower", False), ("pockets", True)])
@@ -111,15 +87,3 @@ def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, h
     assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
-
-
-@pytest.mark.parametrize("free", [1, 9])
-def test_a_settled_basis_is_of_the_span_alone(free: int) -> None:
-    """Whatever basis a decomposition returns, and whatever its last digits are."""
-    rng = np.random.default_rng(free)
-    for _ in range(5):
-        N = np.linalg.qr(rng.standard_normal((30, free)))[0]
-        turned = N @ np.linalg.qr(rng.standard_normal((free, free)))[0]
-        settled = settle_basis(N)
-        assert_allclose(settled @ settled.T, N @ N.T, rtol=0, atol=1e-12)
-        assert_allclose(settle_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)

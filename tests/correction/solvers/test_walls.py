@@ -97,20 +97,3 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
         assert unbalanced(seen, made.poses) <= 1e-6
         touched += beyond(seen, made.poses) > -1e-9
     assert touched > 0
-
-
-@pytest.mark.parametrize("intervals_mm", [((1.0, 2.0), (0.0, 1.0)), ((-9.0, -8.0), (-9.0, 0.0))])
-def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    """Both sides of a stick as wide as its slot: their distances add up to nothing."""
-    scene = scenes.stick_on_castles()
-    L = scales(3, 2.0, 1.0)
-    sides = [
-        c for c in scene.assembly.operations[2].contacts if c.environment in ((("castle1"), "spy"), ("castle1", "sny"))
-    ]
-    gaps = {c: Gap("clearance", 1e-3 * low, 1e-3 * high) for c, (low, high) in zip(sides, intervals_mm, strict=True)}
-    seen = look(replace(scene.assembly, gaps=gaps), scene, twisted(scene.goals, L, np.random.default_rng(0)), L)
-    for name in ("contact", "contact-refuse", "contact-drop"):
-        made = correct(seen, name)
-        assert made.status == "inconsistent"
-        assert made.covariance is None
-        assert made.gap_after_m > seen.gap_m

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import InputError
-from apo_bench.geometry import Solid, measure_intrusion, shrink_pieces
+from apo_bench.geometry import Solid, shrink_pieces
 from apo_bench.importers.assembly.added_clearance import add_clearance
 from apo_bench.importers.assembly.posed import PosedPart
 from apo_bench.importers.assembly.upright import new_upright_scenario
-from apo_bench.importers.assembly.writing import scenario_text, write_scenario
+from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.parts.making import bore, extrude, join, make_rectangle, make_shaft
+from apo_bench.scenario.parts.making import extrude, join, make_rectangle
 from tests.importers.assembly.test_blocked import FLOOR, made
 
 SLOTTED = join(FLOOR, *(extrude(make_rectangle(15, 50, (17.5 * s, 0)), 10, 30) for s in (-1, 1)))
@@ -57,32 +56,3 @@ def test_what_is_deeper_or_not_asked_for_stays_as_it_was_drawn(
 ) -> None:
     parts = slotted(tmp_path, 20.0 + 2.0 * over)
     assert add_clearance(parts, clearance, most) == (parts, ())
-
-
-@pytest.mark.parametrize("over", [0.0, 0.05])
-def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
-    plate = extrude(make_rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
-    parts = made(tmp_path, plate=(plate, (0, 0, 0)), pin=(make_shaft(4.0 + over, 0, 30, "pin"), (0, 0, 0)))
-    (_, pin), _ = add_clearance(parts, 0.25)
-    assert pin.fit == {"pin": pytest.approx(over, abs=1e-5)}
-    assert pin.solid.rounds["pin"].radius == pytest.approx(4e-3, abs=1e-8)
-    assert measure_intrusion(parts[0].solid, parts[0].T, pin.solid, pin.T) < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("fit", "said"),
-    [
-        ("nope = 0", "unknown face 'nope'"),
-        ("head = -1.1", "fit: a number >= -1.0 is needed"),
-        ("head = 'x'", "number"),
-        ("head = 2", "fit: a number <= 1.0 is needed"),
-    ],
-)
-def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
-    parts = slotted(tmp_path, 20.0)
-    path = tmp_path / "own.toml"
-    text = scenario_text(new_upright_scenario(parts), "own", "a test", path)
-    head, tail = text.split("\n[parts.tongue.fit]")
-    path.write_text(head + "\n[parts.tongue.fit]\n" + fit + "\n\n" + tail.split("\n\n", 1)[1], encoding="utf-8")
-    with pytest.raises(InputError, match=said):
-        load_scenario(path)

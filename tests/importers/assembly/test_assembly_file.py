@@ -9,7 +9,6 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from apo_bench import InputError
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.from_cad import import_parts
 from apo_bench.importers.assembly.posed import read_posed
@@ -43,25 +42,9 @@ def test_solids_that_touch_are_parts_with_frames_of_their_own(tmp_path: Path) ->
     np.testing.assert_allclose(sorted(wall.ends[:, 2]), (0, 0.01), atol=1e-6)
 
 
-def test_parts_of_several_files_lie_in_one_frame(tmp_path: Path) -> None:
-    files = []
-    for name, solid in (("base", block(60, 40, 10)), ("lid", block(40, 30, 8, (10, 0, 10)))):
-        (tmp_path / name).mkdir()
-        files.append(stl(tmp_path / name, solid).rename(tmp_path / f"{name}.stl"))
-    poses, said = import_parts(files, tmp_path / "parts")
-    assert [line.partition(":")[0] for line in said] == ["base", "lid"]
-    places = {each.name: 1e3 * each.T[:3, 3] for each in read_posed(poses)}
-    np.testing.assert_allclose(places["lid"] - places["base"], (10, 0, 10), atol=1e-3)
-
-
 def test_the_frame_of_a_turned_part_lies_on_its_axis(tmp_path: Path) -> None:
     """With 41 facets the middle of the box is off the axis by a part of their sagitta."""
     pin = Manifold.cylinder(30, 8, 8, 41).translate((20, 5, 10))
     poses, _ = import_parts([stl(tmp_path, block(90, 60, 10, (0, 0, 0)), pin)], tmp_path / "parts")
     found = next(each for each in read_posed(poses) if each.solid.rounds)
     np.testing.assert_allclose(1e3 * found.T[:3, 3], (20, 5, 10), atol=1.1e-3)
-
-
-def test_a_cavity_is_no_solid(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the file holds one solid"):
-        import_parts([stl(tmp_path, block(40, 40, 40) - block(20, 20, 20, (0, 0, 10)))], tmp_path / "parts")

@@ -72,12 +72,3 @@ def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_t
     assert found.fixed == ("core",)
     assert found.why_fixed.startswith("one of the lowest")
     assert [placing.moves for placing in found.order] == [("cup",)]
-
-
-def test_what_only_touches_upright_walls_is_not_carried(tmp_path: Path) -> None:
-    # A plate on the side of a block, above the table by less than it may fall: nothing but screws would hold it.
-    block = box(0, 30)
-    plate = extrude(make_rectangle(10, 40), 0.4, 30)
-    parts = made(tmp_path, block=(block, (0, 0, 0)), plate=(plate, (30, 0, 0)))
-    with pytest.raises(NoAssemblyOrder, match="'plate' would only touch upright walls of block, so nothing carries it"):
-        new_upright_scenario(parts, "z", ("block",))

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from apo_bench.geometry import Array, Solid, measure_extent, measure_intrusion_depths, pose
-from apo_bench.importers.assembly.fixtures import FLOOR_M, fixture_xml, make_fixture
-from apo_bench.scenario.parts import load_part
+from apo_bench.importers.assembly.fixtures import FLOOR_M, make_fixture
 from apo_bench.scenario.parts.making import build_solid, extrude, make_polygon, make_rectangle, make_shaft
 
 BLADE = build_solid("blade", extrude(make_rectangle(1.4, 40), 0, 50))
@@ -40,20 +37,3 @@ def test_a_part_rests_in_its_fixture_and_is_lifted_straight_out_of_it(name: str)
     depths = measure_intrusion_depths(solid.pieces, T[:3, :3], T[:3, 3] + lifts, fixture.pieces, np.eye(4))
     assert depths[0] > 1e-6  # it would be in it a hair lower
     assert depths[lifts[:, 2] >= 0.0].max() <= 1e-9
-
-
-@pytest.mark.parametrize("name", PARTS)
-def test_the_file_of_a_fixture_is_a_part(name: str, tmp_path: Path):
-    _, fixture, _ = in_fixture(name)
-    path = tmp_path / "fixture.xml"
-    path.write_text(fixture_xml(fixture), encoding="utf-8")
-    assert len(load_part(path).pieces) == len(fixture.pieces)
-
-
-def test_only_what_columns_do_not_carry_stands_between_walls():
-    low, high = (measure_extent(in_fixture("blade")[1].pieces, np.eye(3)[0])[i] for i in (0, 1))
-    assert high - low == pytest.approx(0.0014 + 2 * 0.00515)
-    solid, fixture, T = in_fixture("leaning bar")
-    inside, whole = measure_extent(fixture.pieces, np.eye(3)[0]), measure_extent(solid.pieces, T[0, :3])
-    assert whole[0] < inside[0] - 0.002
-    assert inside[1] + 0.002 < whole[1]

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, Scenario, load_scenario
-from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.importers.assembly.new_scenario import new_scenario
 from apo_bench.importers.assembly.posed import PosedPart, on_the_table
-from apo_bench.importers.assembly.touching import find_clashes
 from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
@@ -20,7 +18,6 @@ from apo_bench.scenario.parts.making import (
     bore,
     extrude,
     join,
-    make_circle,
     make_polygon,
     make_rectangle,
     make_shaft,
@@ -74,11 +71,7 @@ def test_contacts_order_and_starts_are_found_and_poses_closed(tmp_path: Path) ->
     assert set(moved[:2]) == {"pin_1", "pin_2"}
     assert moved[2:] == ["cover"]
     contacts = {str(contact) for contact in scenario.assembly.operations[2].contacts}
-    assert contacts == {
-        "cover.bottom on plate.top",
-        "cover.bore_1 on pin_1.side",
-        "cover.bore_2 on pin_2.side",
-    }
+    assert contacts == {"cover.bottom on plate.top", "cover.bore_1 on pin_1.side", "cover.bore_2 on pin_2.side"}
     assert all(attach.direction @ (0, 0, -1) > 0.99 for attach in scenario.attach)
     waits = [scenario.start[part][:2, 3] for part in moved]
     assert min(np.linalg.norm(a - b) for i, a in enumerate(waits) for b in waits[:i]) > 0.06
@@ -120,9 +113,7 @@ def test_what_is_blocked_where_it_goes_is_put_together_beside_the_assembly(tmp_p
 
 def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Path) -> None:
     tight = made(
-        tmp_path,
-        {"plate": plate(15, 4.0), "pin": PIN},
-        {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 0))},
+        tmp_path, {"plate": plate(15, 4.0), "pin": PIN}, {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 0))}
     )
     with pytest.raises(RuntimeError, match="a press fit or a thread"):
         new_scenario(on_the_table(tight))
@@ -138,11 +129,7 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
 def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: Path) -> None:
     floor = extrude(make_rectangle(90, 60), 0, 10, bottom="bottom", top="top")
     cube = extrude(make_rectangle(20, 20), 0, 30, bottom="bottom", top="top")
-    places = {
-        "floor": ("floor", at(0, 0, 0)),
-        "left": ("cube", at(-15, 0, 10)),
-        "right": ("cube", at(15, 0, 10)),
-    }
+    places = {"floor": ("floor", at(0, 0, 0)), "left": ("cube", at(-15, 0, 10)), "right": ("cube", at(15, 0, 10))}
     found = new_scenario(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
     last = found.grasps[found.order[-1].moves[0]]
     assert last is not None
@@ -164,79 +151,9 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     )
 
 
-def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
-    hole = extrude(make_rectangle(60, 60), 0, 20, bores=[bore((0, 0), 4.3, 12, 20, "bore")], bottom="bottom", top="top")
-    places = {"base": ("base", at(0, 0, 0)), "pin": ("pin", at(0, 0, 12))}
-    pin = make_shaft(4, 0, 12, "side", bottom="tip", top="head")
-    found = new_scenario(on_the_table(made(tmp_path, {"base": hole, "pin": pin}, places)))
-    assert not found.notes
-    grasp = found.grasps["pin"]
-    assert grasp is not None
-    assert grasp.point[2] - 0.010 > 0.0085
-
-
 def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     base = extrude(make_rectangle(60, 60), 0, 20, bottom="bottom", top="top")
     bar = extrude(make_rectangle(100, 20), 0, 10, bottom="bottom", top="top")
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on base"):
         new_scenario(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
-
-
-def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    poses = tmp_path / "poses.toml"
-    out = tmp_path / "pile.toml"
-    poses.write_text(
-        '[[pose]]\npart = "block"\nname = "upper"\nat_mm = [300, 100, 85]\nquaternion_wxyz = [1, 0, 0, 0]\n'
-        '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\ncolor = [0.2, 0.4, 0.6]\n',
-        encoding="utf-8",
-    )
-    asked = ["scenario", "new", "block", "--poses", str(poses), "--fixed", "lower", "--out", str(out)]
-    assert main(asked) == 0
-    assert "1. upper comes from above, onto lower: 1 contacts" in capsys.readouterr().out
-    assert main(asked) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert main([*asked, "--overwrite"]) == 0
-    capsys.readouterr()
-    text = out.read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
-    out.write_text(text, encoding="utf-8")
-    assert main(["scenario", "check", str(out), "--seeds", "0"]) == 1
-    said = capsys.readouterr().out.splitlines()
-    good = [line.split()[:2] for line in said if not line.startswith("wrong")]
-    assert good == [["ok", what] for what in ("file", "parts", "starts", "ways", "play", "gripper")]
-    line = 1 + next(i for i, each in enumerate(text.splitlines()) if each.startswith("[site]"))
-    assert f"line {line}: site: all is in reach with center_mm = " in said[-1], said
-    out.write_text("schema = 1\n", encoding="utf-8")
-    assert main(["scenario", "check", str(out)]) == 1
-    assert main(["scenario", "check", str(tmp_path / "none.toml")]) == 2
-    assert main(["scenario", "new", "--out", str(tmp_path / "other.toml")]) == 2
-
-
-@pytest.mark.parametrize(("deep_mm", "is_loaded"), [(0.01, True), (0.03, False)])
-def test_parts_that_are_as_deep_in_each_other_as_a_new_scenario_allows_are_loaded(
-    tmp_path: Path, deep_mm: float, is_loaded: bool
-) -> None:
-    bodies = {
-        "floor": extrude(make_rectangle(80, 80), 0, 10),
-        "block": extrude(make_rectangle(20, 20), 0, 30),
-        "edge": extrude(make_polygon((0, 0), (20, -10), (20, 10)), 0, 30),
-    }
-    places = {"floor": at(0, 0, 0), "block": at(-10, 0, 10), "edge": at(-deep_mm, 0, 10)}
-    parts = on_the_table(made(tmp_path, bodies, {name: (name, T) for name, T in places.items()}))
-    if not is_loaded:
-        with pytest.raises(RuntimeError, match=r"0\.03 mm inside each other"):
-            new_scenario(parts)
-        return
-    write_scenario(new_scenario(parts), tmp_path / "own.toml", "own", "a test")
-    assert len(load_scenario(tmp_path / "own.toml").assembly) == 2
-
-
-def test_a_tube_in_a_pit_of_a_boss_is_pressed_into_nothing(tmp_path: Path) -> None:
-    """Its bore is narrower than the boss around it, on one axis with it and at one height."""
-    boss = extrude(make_circle(5), 10, 20, bores=[bore((0, 0), 4.5, 15, 20, "pit")])
-    tube = extrude(make_circle(4), 16, 30, bores=[bore((0, 0), 2.65, 16, 30, "bore")])
-    bodies = {"base": join(extrude(make_rectangle(80, 80), 0, 10), boss), "tube": tube}
-    parts = made(tmp_path, bodies, {name: (name, at(0, 0, 0)) for name in bodies})
-    solids = {part.name: part.solid for part in parts}
-    assert any(wall.radius == pytest.approx(0.005) for wall in solids["base"].rounds.values())
-    assert find_clashes(solids, {part.name: part.T for part in parts}, 0.25) == []

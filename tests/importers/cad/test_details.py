@@ -7,16 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
-from apo_bench import InputError
-from apo_bench.geometry import Face
 from apo_bench.importers.cad.faces.fitting import Round
-from apo_bench.importers.cad.importing import _fault, import_solid, raw_solids
+from apo_bench.importers.cad.importing import raw_solids
 from apo_bench.importers.cad.step.from_brep import raw_of
 from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Plane
-from apo_bench.scenario.parts import load_part
-from tests.importers.cad.made import block, prism, rod, write_stl, write_triangles
+from tests.importers.cad.made import block, rod, write_triangles
 
 
 def triangles(mesh: Any) -> Any:
@@ -24,28 +20,11 @@ def triangles(mesh: Any) -> Any:
     return np.asarray(raw.vert_properties)[:, :3][np.asarray(raw.tri_verts)]
 
 
-def test_a_face_whose_hole_crosses_its_border_is_no_face() -> None:
-    square = 1e-2 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-    hole = 0.2 * square[::-1]
-    solid = load_part("block")
-    beside = hole + np.array([0.01, 0.0, 0.0])
-    assert _fault(solid, Face("top", square, (beside,))) == "its outline crosses itself"
-    assert _fault(solid, Face("top", square, (hole,))) != "its outline crosses itself"
-
-
 def test_corners_that_nearly_meet_are_joined(tmp_path: Path) -> None:
     near = triangles(block(20, 20, 20)).astype(np.float32)
     near[0, 0, 0] = np.nextafter(near[0, 0, 0], np.float32(100.0))
     _, (raw,) = raw_solids(write_triangles(near, tmp_path / "a.stl"), None)
     assert raw.mesh.volume == pytest.approx(8000.0)
-
-
-@pytest.mark.parametrize("vertex", ["0 0 x", "0 0", "0 0 0"])
-def test_a_text_stl_without_its_corners_is_refused(vertex: str, tmp_path: Path) -> None:
-    path = tmp_path / "a.stl"
-    path.write_text(f"solid a\nfacet normal 0 0 1\nouter loop\nvertex {vertex}\nendloop\nendfacet\nendsolid a\n")
-    with pytest.raises(InputError, match="no STL file that can be read"):
-        raw_solids(path, "mm")
 
 
 def as_brep(body: Any) -> BrepSolid:
@@ -82,27 +61,3 @@ def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bo
     top = raw.named()["pz"]
     assert top.direction.tolist() == [0.0, 0.0, 1.0]
     assert top.point[2] == pytest.approx(20.0)
-
-
-def test_a_window_in_a_wall_of_a_step_file_stays_open(tmp_path: Path) -> None:
-    body = rod(5.0, 20.0) - block(6, 4, 4, (5, 0, 8))
-    raw = raw_of(tmp_path / "a.step", as_brep(body))
-    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
-    (wall,) = (region for region in raw.regions if region.is_round)
-    assert (wall.is_whole, wall.square) == (True, False)
-
-
-def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_path: Path) -> None:
-    outline = [(-20, -20), (6, -20), (6, -15), (20, -15), (20, 15), (6, 15), (6, 20), (-20, 20)]
-    mesh = prism([(float(x), float(y)) for x, y in outline], 20) - rod(4, 20, top=8)
-    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
-    part = import_solid(raw, "a", tmp_path, "a.stl")
-    assert dict(part.refused) == {}
-    volume = sum(ConvexHull(1e3 * piece.corners).volume for piece in part.solid.pieces)
-    assert volume == pytest.approx(1e9 * part.solid.volume, rel=2e-3)
-
-
-def test_a_part_that_is_too_light_is_refused(tmp_path: Path) -> None:
-    _, (raw,) = raw_solids(write_stl(block(2, 2, 2), tmp_path / "a.stl"), "mm")
-    with pytest.raises(InputError, match="the part weighs 8e-06 g at 1 kg/m"):
-        import_solid(raw, "a", tmp_path, "a.stl", 1.0)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from apo_bench import InputError
 from apo_bench.importers.cad.importing import import_solid, raw_solids
 from apo_bench.importers.cad.pieces import cutting
 from tests.importers.cad.made import block, rod, write_stl
@@ -43,28 +42,3 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     )
     assert part.solid.volume - whole.solid.volume == pytest.approx(filled, rel=0.01)
     assert {len(face.holes) for face in part.solid.faces.values()} == {0, 6}
-
-
-def test_beside_others_many_holes_are_filled_that_nothing_comes_into(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cutting, "_WEDGES", 60)
-    _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
-    part = import_solid(raw, "part", tmp_path, "a.stl", others=np.array([[10.0, 0.3, 2.0], [20.0, 0.3, 2.0]]))
-    kept = {round(1e3 * float(wall.point[0])) for wall in part.solid.rounds.values()}
-    assert {10, 20} <= kept
-    assert len(kept) == 6 - len(part.cut.filled) <= 3
-    # Where others come into all of them, all stay; and so they do of a part alone.
-    into_all = np.array([[10.0 * k, 0.3, 2.0] for k in range(6)])
-    assert not cutting.cut(raw, into_all).filled
-    assert not cutting.cut(raw).filled
-
-
-def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cutting, "MOST_PIECES", 1)
-    both = block(10, 10, 10) + block(30, 5, 5)
-    _, (raw,) = raw_solids(write_stl(both, tmp_path / "a.stl"), None)
-    with pytest.raises(InputError, match=r"a.stl: the part takes more than 1 convex pieces without its holes"):
-        import_solid(raw, "a", tmp_path, "a.stl")

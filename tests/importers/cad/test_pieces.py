@@ -12,7 +12,7 @@ from apo_bench.importers.cad.faces.regions import find_regions
 from apo_bench.importers.cad.pieces.cutting import cut
 from apo_bench.importers.cad.pieces.refining import depths
 from apo_bench.importers.cad.solids import RawSolid, SolidPlace, convert_to_mesh, name_regions
-from tests.importers.cad.made import block, rod
+from tests.importers.cad.made import block
 
 
 def raw_of(name: str, body: Manifold) -> RawSolid:
@@ -58,12 +58,3 @@ def test_what_fits_as_drawn_fits_as_pieces() -> None:
     ]
     assert (SOCKET ^ PLUG).volume() == 0.0
     assert (bodies[0] ^ bodies[1]).volume() < 0.01
-
-
-def test_others_are_followed_along_ways_that_are_free() -> None:
-    raws = [raw_of("plate", block(60, 40, 20) - rod(5.3, 20)), raw_of("pin", rod(5, 10))]
-    of_plate, of_pin = coming_near(raws)
-    # The pin leaves its hole upwards and downwards, so all of the wall is passed; sideways it would strike.
-    assert of_plate[:, 2].max() > 19.0
-    assert np.hypot(*of_plate[:, :2].T).max() < 5.6
-    assert len(of_pin)

@@ -37,9 +37,3 @@ def test_so_many_sides_are_round_and_fewer_are_flat(sides: int, fewest: int, rou
     assert 1e9 * done.solid.volume == pytest.approx(volume, rel=1e-4)
     said = "\n".join(part_lines(report_part(done)))
     assert (f"cylinder of {sides} sides, radius 5 mm" in said) == bool(round_ones)
-
-
-def test_a_chamfer_stays_flat_where_few_sides_are_round(tmp_path: Path) -> None:
-    corners = np.array([(x, y) for x, y in ((-20, -15), (20, -15), (20, 10), (15, 15), (-20, 15))], dtype=float)
-    solid = trimesh.creation.extrude_triangulation(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 4]], 10.0)
-    assert [region.kind for region in found(solid, tmp_path, 6).regions] == ["plane"] * 7

@@ -13,7 +13,7 @@ from apo_bench.importers.recording.camera_file import Conventions, read_camera
 from apo_bench.importers.recording.formats import FORMATS, read_log
 from apo_bench.importers.recording.objects_file import name_tracks, read_objects
 from tests.importers.recording.log_forms import FORMS, Tracked
-from tests.recorded import CAMERA, RATE_HZ, motion
+from tests.recorded import CAMERA, motion
 
 
 def tracked() -> dict[str, Tracked]:
@@ -54,20 +54,12 @@ HEAD = "t_s,id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"
 ROW = "0.1,a,0,0,900,1,0,0,0\n"
 WRONG = [
     ("csv", "", "the file is empty"),
-    ("csv", HEAD, "no pose stands in the file"),
-    ("csv", HEAD + ROW + "0.2,a,nan,0,900,1,0,0,0\n", "line 3, column x_mm: a finite number is needed, 'nan'"),
-    ("csv", HEAD + ROW + ROW, "line 3: the time of 'a' stands twice"),
     ("csv", HEAD + "0.1,a,0,0,0.9,1,0,0,0\n", "0.9 mm, so its lengths are in another unit"),
-    ("csv", HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times are in another unit"),
     ("csv", HEAD + "0.1,a,0,0,900,1,1,0,0\n", "line 2: a quaternion of length 1 is needed"),
-    ("csv", HEAD.replace("w,qx,qy,qz", "0,q1,q2,q3") + ROW, 'no stated order; state `quaternion = "wxyz"`'),
     ("csv", HEAD.replace("_mm", "") + ROW, "the unit of the column 'x' is not known"),
-    ("csv", "# mytracker 1.2\n" + HEAD + ROW, "line 2: 9 cells were given, and the first line names 1"),
     ("csv", HEAD.replace("qz", "q") + ROW, "the columns of one rotation are needed, 0 are complete"),
     ("csv", HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
-    ("tum", "# t\n1 0 0 0.9 0 0 0 1 7", "line 2: 9 words were given; eight numbers are needed"),
     ("ros-json", '{"header": {"stamp": {"sec": 1}}}', "the column 'x_mm' is missing"),
-    ("ros-json", "3", "a message with named fields is needed"),
     ("ros-json", "{", "this is not JSON"),
 ]
 
@@ -94,20 +86,6 @@ def test_the_identity_among_other_poses_is_a_lost_frame(tmp_path: Path) -> None:
     assert len(read_log(log, "csv", Conventions()).tracks["a"].t) == 1
 
 
-@pytest.mark.parametrize(
-    ("stated", "sentence"),
-    [
-        ({"id": "body"}, "log.columns: unknown column 'body'"),
-        ({"corpus": "id"}, "log.columns: 'corpus' has no meaning"),
-    ],
-)
-def test_a_column_that_does_not_exist_is_named(stated: dict[str, str], sentence: str, tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
-    with pytest.raises(InputError) as error:
-        read_log(tmp_path / "log.csv", "csv", Conventions(columns=stated))
-    assert sentence in str(error.value)
-
-
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("apo_bench.importers.recording.log_tables.LARGEST_LOG_BYTES", 1000)
     (tmp_path / "log.csv").write_text(HEAD + "".join(f"{i},a,0,0,900,1,0,0,0\n" for i in range(100)), encoding="utf-8")
@@ -125,26 +103,3 @@ def test_an_id_that_is_no_part_and_a_part_without_its_id_are_named(tmp_path: Pat
         (tmp_path / "o.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{parts}\n', encoding="utf-8")
         with pytest.raises(InputError, match=sentence):
             name_tracks(log, read_objects(tmp_path / "o.toml"))
-
-
-def test_images_of_bop_are_counted_by_the_rate_and_the_best_estimate_counts(tmp_path: Path) -> None:
-    rows = [f"1,{i},5,{score},1 0 0 0 1 0 0 0 1,0 0 {z},0.1" for i in range(3) for score, z in ((0.2, 800), (0.9, 900))]
-    text = "\n".join(["scene_id,im_id,obj_id,score,R,t,time", *rows])
-    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
-    track = read_log(tmp_path / "log.csv", "bop", Conventions(rate_hz=RATE_HZ)).tracks["5"]
-    assert np.allclose(track.T[:, 2, 3], 0.9)
-    assert np.allclose(track.t * RATE_HZ, [0, 1, 2])
-    with pytest.raises(InputError, match="state `rate_hz` in the camera file"):
-        read_log(tmp_path / "log.csv", "bop", Conventions())
-
-
-@pytest.mark.parametrize("sorted_by_id", [False, True])
-def test_rows_without_a_time_are_counted_by_the_rate_of_images(sorted_by_id: bool, tmp_path: Path) -> None:
-    names = [name for name in "ab" for _ in range(3)] if sorted_by_id else list("ab" * 3)
-    rows = "".join(f"{name},{i},0,900,1,0,0,0\n" for i, name in enumerate(names))
-    (tmp_path / "log.csv").write_text("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n" + rows, encoding="utf-8")
-    log = read_log(tmp_path / "log.csv", "csv", Conventions(rate_hz=10.0))
-    for name in "ab":
-        assert log.tracks[name].t == pytest.approx([0.0, 0.1, 0.2])
-    with pytest.raises(InputError, match="or state `rate_hz` there"):
-        read_log(tmp_path / "log.csv", "csv", Conventions())

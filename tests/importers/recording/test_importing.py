@@ -17,7 +17,6 @@ from apo_bench.importers.recording.ordering import Stated
 from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.importers.recording.unplanned import unplanned_recording
 from apo_bench.scenario.layout import place_layout
-from tests.importers.recording.watched_demonstrations import watch_demonstration
 from tests.recorded import CAMERA, seen
 
 NOTHING = Stated()
@@ -64,24 +63,6 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
     assert all(not operation.rest.mean.inlier.all() for operation in recording.operations if operation.rest is not None)
 
 
-def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
-    tracks = seen(NAME, 0.5)
-    often = {
-        part: PoseTrack((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
-        for part, (t, T) in tracks.items()
-    }
-    repeated = imported(often)
-    plain = imported(tracks)
-    off = pose.log(pose.inverse(goals(NAME)) @ repeated.observation.poses)
-    assert np.abs(off[:, :3]).max() < 1e-3
-    means = (
-        [operation.rest.mean.covariance for operation in each.operations if operation.rest]
-        for each in (repeated, plain)
-    )
-    ratio = np.divide(*(np.trace(C, axis1=1, axis2=2) for C in map(np.array, means)))
-    assert ratio.min() > 0.5  # three times as many frames would make it 0.33
-
-
 def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
     puts = unplanned_recording(seen("carried_bridge", 0.5), GIVEN, "log.csv").placements
     operations = load_scenario("carried_bridge").assembly.operations
@@ -114,20 +95,6 @@ def test_another_convention_that_fits_better_is_named(mistake: str) -> None:
     tracks = {part: PoseTrack(t, wrong(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
     with pytest.raises(InputError, match=f"no contact fits .* state another `{mistake}` in the camera file"):
         import_recording(tracks, KNOWN, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
-
-
-def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
-    tracks = seen(NAME, 0.3)
-    aside = PoseTrack(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    assert imported(tracks).unclear == ()
-    assert "operation 3 (stick) leaves a contact open by 1" in imported({**tracks, "stick": aside}).unclear[0]
-
-
-def test_parts_that_were_taken_for_each_other_are_no_recording_of_the_scenario() -> None:
-    tracks = seen(NAME, 0.3)
-    tracks["castle1"], tracks["stick"] = tracks["stick"], tracks["castle1"]
-    with pytest.raises(InputError, match=r"'castle2', which operation 2 moves, rests from 0\.00 s, 3\.\d+ s"):
-        imported(tracks)
 
 
 def without(track: PoseTrack, first_s: float, last_s: float) -> PoseTrack:
@@ -164,24 +131,6 @@ def test_a_part_that_moves_during_the_operation_of_another_is_refused() -> None:
     # An adjustment is counted into the error.
     nudged = PoseTrack(t, np.where((t > 4.5)[:, None, None], T @ pose.at((0.004, 0.0, 0.0)), T))
     assert imported({**tracks, "castle1": nudged}).observation.covariance[0, 0, 0] > 0.003**2
-
-
-def test_a_pause_with_carried_parts_in_the_air_is_not_where_the_operation_before_ended() -> None:
-    """The stick is put below two cubes, lifted with them, held still for longer than before, and put down."""
-    scene, tracks = watch_demonstration("pocket_table", 1, 1.0)
-    recording = import_recording(tracks, GIVEN, scene.scenario, NOTHING, "log.csv")
-    below, lifted = (operation.interval for operation in recording.operations[4:])
-    assert below is not None
-    assert lifted is not None
-    assert (below.begins, lifted.begins) == (pytest.approx(10.9, abs=0.2), pytest.approx(13.3, abs=0.2))
-
-
-def test_a_part_that_is_not_tracked_or_not_there_is_named() -> None:
-    tracks = seen(NAME, 0.3)
-    with pytest.raises(InputError, match="'stick', which operation 3 moves, is not tracked"):
-        imported({part: track for part, track in tracks.items() if part != "stick"})
-    with pytest.raises(InputError, match="unknown part 'stik'; did you mean 'stick'"):
-        imported({**tracks, "stik": tracks["stick"]})
 
 
 @pytest.mark.parametrize("put_down", [True, False])

@@ -10,8 +10,7 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, find_symmetries, pose
-from apo_bench.perception.depth_camera.explained import measure_share
-from apo_bench.perception.depth_camera.fit import PRIOR, Points, covariance, refine_fit
+from apo_bench.perception.depth_camera.fit import Points, covariance, refine_fit
 from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
 from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.perception.depth_camera.starts import guess_poses
@@ -137,37 +136,3 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
         z[i] = xi[i] @ np.linalg.solve(covariance(surface, seen, fitted, 3e-3, noise, bias), xi[i])
     assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4
     assert 0.7 < z.mean() / 6.0 < 1.4
-
-
-def test_what_no_point_says_is_stated_to_be_unknown() -> None:
-    surface = SURFACES["stick"]
-    T = STANDING
-    points = points_on("stick", T)
-    along = (points.at - T[:3, 3]) @ T[:3, 0]
-    middle = points.only(np.abs(along) < 0.05)
-    C = covariance(surface, middle, T, 3e-3, 1e-3, 1e-4)
-    deviation = np.sqrt(np.diag(C))
-    assert deviation[0] > 0.9 * PRIOR[0]
-    assert deviation[1:3].max() < 1e-3
-    whole = np.sqrt(np.diag(covariance(surface, points, T, 3e-3, 1e-3, 1e-4)))
-    assert whole[0] < 1e-3
-    assert np.linalg.eigvalsh(C)[0] > 0.0
-
-
-def test_wrong_models_and_wrong_poses_explain_less() -> None:
-    finder = RangeFinder()
-    images = np.array([range_of({"castle": STANDING}, view) for view in finder.views])
-    masks = [
-        np.isfinite(MODELS({"castle": STANDING}, view.origin, view.rays)[0]).reshape(view.height, view.width)
-        for view in finder.views
-    ]
-
-    def share(name: str, T: Array) -> float:
-        return measure_share({name: T}, MODELS, finder.views, images, masks, 1e-3)
-
-    right = share("castle", STANDING)
-    assert right > 0.99
-    assert share("stick", STANDING) < 0.4
-    assert share("cube", STANDING @ pose.at((0, 0, 0.02))) < 0.8
-    assert share("castle", STANDING @ pose.at((0.01, 0, 0))) < 0.95
-    assert share("castle", STANDING @ pose.at((0, 0, 0), (0, 0, 90.0))) < right - 0.02

@@ -15,7 +15,7 @@ from apo_bench.geometry import Hull, find_ways_out, pose
 from apo_bench.geometry.penetration import measure_intrusion
 from apo_bench.perception.detection.estimate import estimate
 from apo_bench.perception.detection.jointly import detect_contacts_jointly
-from tests import rounds, scenes
+from tests import scenes
 from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated
 
 
@@ -50,14 +50,6 @@ def names(assembly: Assembly) -> set[str]:
     return {str(relation.contact) for relation in assembly.relations()}
 
 
-def test_without_contacts_nothing_is_gained_and_nothing_moved() -> None:
-    seen = block_at(3, 4, 27)
-    estimated = estimate(seen, seen.assembly, seen.poses)
-    assert estimated.badness == 0.0
-    assert_allclose(estimated.poses, seen.poses, atol=1e-12)
-    assert_allclose(estimated.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
-
-
 def test_an_estimate_lies_where_contact_puts_it() -> None:
     """`contact` solves exactly; here contacts give a little, 0.1 mm."""
     for name in NAMES:
@@ -84,18 +76,6 @@ def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
         - multivariate_normal(cov=np.diag(room**2)).logpdf([0, 0, 0])
     )
     assert estimated.badness == pytest.approx(-by_hand, rel=0.01)
-
-
-def test_a_contact_that_others_imply_gains_nothing() -> None:
-    """Here because it is one of the others."""
-    for name in NAMES:
-        scene = scenes.ALL[name]()
-        seen = seen_at(scene, 2, 1.0)
-        every = estimate(seen, scene.assembly, seen.poses)
-        last = scene.assembly.operations[-1]
-        doubled = replace(last, contacts=(*last.contacts, last.contacts[0]))
-        twice = replace(scene.assembly, operations=(*scene.assembly.operations[:-1], doubled))
-        assert estimate(seen, twice, seen.poses).badness == pytest.approx(every.badness, abs=0.05)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -140,12 +120,6 @@ def test_parts_that_are_seen_inside_each_other_touch() -> None:
     assert "B.nx on A.px" in names(within.assembly)
 
 
-def test_operations_that_were_not_seen_make_no_contact() -> None:
-    seen = beside(0.5, 1.0)
-    blind = replace(seen, observed=np.array([True, False]))
-    assert names(detect_contacts_jointly(blind).assembly) == {"A.nz on table.top"}
-
-
 @pytest.mark.parametrize("hulls", [False, True])
 def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None:
     a = scenes.block("A")
@@ -161,11 +135,3 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None
         out = np.array(T_a)
         out[:3, 3] += (length + 1e-5) * direction
         assert measure_intrusion(a, out, b, T_b) == 0.0
-
-
-def test_round_faces_are_recognised_with_flat_ones() -> None:
-    """A peg in the bore of a plate, both on the table."""
-    scene = rounds.peg_in_plate()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
-    recognised = detect_contacts_jointly(stated(scenes.seen(scene, goals), 0.5))
-    assert contacts(recognised.assembly) == contacts(scene.assembly)

@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 from apo_bench import Demonstration, draw_layout, load_scenario
 from apo_bench.geometry import find_approximate_symmetries, pose
-from apo_bench.perception.observation.models.failures import PRESETS, CameraFailures, make_failures
+from apo_bench.perception.observation.models.failures import PRESETS, make_failures
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.reobservations import Reobservations
@@ -59,35 +59,6 @@ def test_swaps_exchange_two_views_of_like_parts():
     assert shown.assembly.operations[2].main == "castle2"
     assert_array_equal(swapped.poses[0], shown.poses[2])
     assert_array_equal(swapped.poses[2], shown.poses[0])
-
-
-def test_an_error_along_the_ray_is_on_it():
-    shown = demonstration()
-    model = make_failures("rays", NOISE_LEVEL, rate=1.0)
-    off = failures("rays", 3, rate=1.0).poses[:, :3, 3] - shown.poses[:, :3, 3]
-    length = np.linalg.norm(off, axis=1)
-    assert ((length >= 0.02) & (length <= 0.06)).all()
-    assert_allclose(np.cross(off, model.camera.rays(shown.poses)), 0.0, atol=1e-12)
-
-
-def test_a_displaced_view_has_one_displacement():
-    shown = demonstration()
-    seen = failures("displaced-view", 5)
-    moved = (seen.poses @ pose.inverse(shown.poses))[seen.false]
-    assert len(moved) == 2
-    assert_allclose(moved[0], moved[1], atol=1e-12)
-
-
-def test_a_mixture_fails_in_several_ways():
-    shown = demonstration()
-    flips, rays = (PRESETS[name]._replace(rate=0.2) for name in ("flips", "rays"))
-    mixed = CameraFailures(NOISE_LEVEL, (flips, rays))
-    seen = [mixed.draw_false(shown, np.random.default_rng(seed)) for seed in range(300)]
-    turned = [np.abs(views.poses - shown.poses)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
-    shifted = [np.abs(views.poses - shown.poses)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
-    assert 0.15 < np.mean(turned) < 0.25
-    assert np.mean(shifted) > 0.15
-    assert observe(shown, mixed, np.random.default_rng(0)).outliers.gross == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("repeat", [0.0, 0.8])

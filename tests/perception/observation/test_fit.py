@@ -12,13 +12,10 @@ from scipy.stats import kstest
 
 from apo_bench.formats.bop import read_results
 from apo_bench.formats.bop_truth import read_truth
-from apo_bench.perception.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit
-from apo_bench.perception.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, round_split, split_of_quantiles
+from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
 from apo_bench.perception.observation.models.empirical import residuals_text
-from apo_bench.perception.observation.models.fitted import MeasuredNoise
 from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
 from apo_bench.perception.observation.models.tails import Split, Tail
-from apo_bench.perception.observation.noise_file import presets, read_noise
 from apo_bench.viz.fit_text import fit_form
 from tests import bop_made as made_of
 from tests.bop_made import Known
@@ -56,22 +53,6 @@ def test_a_right_fit_is_close_everywhere(known_file: Residuals) -> None:
     for figures in goodness_of_fit(known_file, fit_noise(known_file, "made")):
         assert figures.distance < 1.95 / np.sqrt(known_file.upright.sum())
         assert_allclose(figures.fitted, figures.observed, rtol=0.05)
-
-
-def test_a_wrong_fit_is_told(known_file: Residuals) -> None:
-    wrong = MeasuredNoise(
-        "wrong", Split(Tail(4.0, 4.0), Tail(8.0, 3.0), 50.0), fit_noise(known_file, "").turn_deg, 0.1, 0.1, 800
-    )
-    across, *others = goodness_of_fit(known_file, wrong)
-    assert across.distance > 0.2 > 10.0 * across.by_chance
-    assert max(one.distance for one in others) < 0.03
-
-
-def test_the_limit_is_no_sign_of_short_tails() -> None:
-    """Errors that are mostly beyond the limit: the scale is that of the whole, not of what is left."""
-    split = Split(Tail(4.0), Tail(30.0), 50.0)
-    fitted = fit_split(split.draw(40_000, np.random.default_rng(5)), 50.0)
-    assert_allclose([fitted.across.scale, fitted.along.scale], [4.0, 30.0], rtol=0.05)
 
 
 @pytest.mark.parametrize("split", SPLITS)
@@ -117,36 +98,6 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     assert fit_form(residuals, measured, goodness_of_fit(residuals, measured))["round_objects"] == [3]
 
 
-@pytest.mark.parametrize("turns", ["quarters", "end over end"])
-def test_parts_that_look_alike_about_an_axis_far_from_the_origin_are_no_outliers(turns: str, tmp_path: Path) -> None:
-    """All estimates of object 2 are right; those of the others have their outliers."""
-    rng = np.random.default_rng(8)
-    drawn = made_of.draw(2000, Known(missed=0.0), rng)
-    part, n = drawn.where[:, 2], len(drawn.where)
-    gross = np.linalg.norm(drawn.shift, axis=1) >= 50.0
-    kept = (part != 2) | ~gross
-    angles = {
-        "quarters": rng.choice([0, 90, 180, 270], n),
-    }
-    axes = rng.choice(list("xyz"), n) if turns == "end over end" else np.full(n, "z")
-    turn = np.array(
-        [
-            Rotation.from_euler(axis, angle if of == 2 else 0.0, degrees=True).as_matrix()
-            for axis, angle, of in zip(axes, angles.get(turns, rng.choice([0, 180], n)), part, strict=True)
-        ]
-    )
-    centre = np.array([70.0, -20.0, 10.0])
-    t = drawn.t_seen + np.einsum("nij,nj->ni", drawn.R_seen, centre - turn @ centre)
-    seen = made_of.results(tmp_path / "e.csv", drawn.where[kept], (drawn.R_seen @ turn)[kept], t[kept])
-    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
-    residuals = compared_files(seen, truth)
-    assert (residuals.off_mm[residuals.found & (part == 2)] < 60.0).all()
-    assert np.mean(residuals.inlier[residuals.found & (part == 2)]) > 0.98
-    assert residuals.beside > 100
-    others = residuals.found & (part != 2)
-    assert (residuals.inlier[others] == ~gross[others]).all()
-
-
 @pytest.fixture(scope="module")
 def lmo(request: pytest.FixtureRequest) -> Residuals:
     return published(request, "lmo")
@@ -176,32 +127,3 @@ def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> 
     for figures in form["fit"].values():
         assert_allclose(figures["fitted"][1:], figures["observed"][1:], rtol=0.1)
         assert figures["kolmogorov_smirnov"] < figures["kolmogorov_smirnov_by_chance"]
-
-
-@pytest.mark.parametrize("name", ["lmo", "tless"])
-def test_the_preset_is_the_fit(name: str, request: pytest.FixtureRequest) -> None:
-    shipped = read_noise(presets()[f"megapose-{name}"])[0]
-    measured = fit_noise(published(request, name), "")
-    for mine, fitted in ((shipped.shift_mm, measured.shift_mm), (shipped.turn_deg, measured.turn_deg)):
-        assert_allclose(
-            [*mine.across, *mine.along, mine.limit], [*fitted.across, *fitted.along, fitted.limit], rtol=1e-3
-        )
-    assert_allclose(
-        [shipped.missed, shipped.outliers, shipped.farthest_mm],
-        [measured.missed, measured.outliers, measured.farthest_mm],
-        rtol=1e-3,
-    )
-
-
-def test_a_fit_to_quantiles_meets_them() -> None:
-    """Of MegaPose on T-LESS, whatever it is turned by; a Student t meets p50, p75 and p90 within 10 %."""
-    across = {50: 0.8, 75: 1.2, 90: 2.3}
-    along = {50: 5.3, 75: 9.5, 90: 16.5}
-    drawn = split_of_quantiles(across, along, 50.0).draw(200_000, np.random.default_rng(0))
-    for sizes, given in ((np.linalg.norm(drawn[:, :2], axis=1), across), (np.abs(drawn[:, 2]), along)):
-        assert_allclose(np.percentile(sizes, [*given]), [*given.values()], rtol=0.1)
-    turns = np.linalg.norm(round_split(2.0, 30.0).draw(200_000, np.random.default_rng(1)), axis=1)
-    assert np.percentile(turns, 25) == pytest.approx(2.0, rel=0.01)
-    assert np.percentile(np.linalg.norm(np.random.default_rng(2).standard_normal((400_000, 3)), axis=1), 25) == (
-        pytest.approx(LOWER_QUARTILE_OF_THREE, rel=0.01)
-    )

@@ -8,19 +8,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.observation.models.isotropic import (
-    IsotropicNoise,
-    PerPartNoise,
-    part_factors,
-)
-from apo_bench.perception.observation.models.sighted import (
-    ACROSS_SIGHT,
-    ALONG_SIGHT,
-    IN_IMAGE,
-    OUT_OF_IMAGE,
-    AnisotropicNoise,
-    line_of_sight,
-)
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise, PerPartNoise, part_factors
 from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
 from tests import scenes
 
@@ -35,38 +23,6 @@ def see(noise: Noise, seed: int) -> Observation:
 def twists(seen: Observation, shown: Array) -> Array:
     """Body twists by which goals are wrong, (n, 6)."""
     return pose.log(pose.inverse(shown) @ seen.poses)
-
-
-def test_draws_differ_along_the_sight_and_across_it() -> None:
-    """Empirical world covariance against the factors, whatever the part's frame."""
-    sight = line_of_sight()
-    world = []
-    for seed in range(1000):
-        seen = see(AnisotropicNoise(NOISE_LEVEL), seed)
-        R = seen.poses[:, :3, :3]
-        xi = twists(seen, TOWER.goals)
-        world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
-    for half, (along, across), sigma in zip(
-        np.concatenate(world, axis=1),
-        ((ALONG_SIGHT, ACROSS_SIGHT), (IN_IMAGE, OUT_OF_IMAGE)),
-        (3e-3, np.radians(6.0)),
-        strict=True,
-    ):
-        expected = sigma**2 * (across**2 * np.eye(3) + (along**2 - across**2) * np.outer(sight, sight))
-        assert_allclose(half.T @ half / len(half), expected, atol=0.1 * np.abs(expected).max())
-
-
-def test_the_line_of_sight_is_fixed_in_the_world() -> None:
-    """Turn the parts: the body covariance turns, that in the world stays."""
-    turned = scenes.turned(TOWER, pose.at((0.3, 0.1, 0.0), (15.0, -40.0, 100.0)))
-    worlds = []
-    for scene in (TOWER, turned):
-        seen = observe(scenes.shown(scene), AnisotropicNoise(NOISE_LEVEL), np.random.default_rng(4))
-        R = np.zeros((len(seen.poses), 6, 6))
-        R[:, :3, :3] = R[:, 3:, 3:] = seen.poses[:, :3, :3]
-        worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
-    assert_allclose(worlds[1], worlds[0], atol=1e-15)
-    assert_allclose(worlds[0], np.tile(worlds[0][0], (3, 1, 1)), atol=1e-15)
 
 
 def test_a_part_is_as_bad_in_every_operation() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from apo_bench import Demonstration, InputError, Observation, observe
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import pose
 from apo_bench.perception.observation.models.displacement import COVARIANCE_FLOOR, floor_covariance
 from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -18,21 +18,6 @@ from tests import scenes
 pytestmark = pytest.mark.numeric
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
-
-
-def errors(noise_level: NoiseLevel, draws: int) -> Array:
-    """Body twists of what was seen, from what was shown, (draws * n, 6)."""
-    rng = np.random.default_rng(11)
-    demonstration = scenes.shown(TOWER)
-    seen = [IsotropicNoise(noise_level)(demonstration.assembly, demonstration, rng).poses for _ in range(draws)]
-    return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
-
-
-def test_errors_are_gaussian() -> None:
-    from scipy.stats import kstest
-
-    unit = errors(NoiseLevel(1.0, 1.0), 200) / np.repeat([1e-3, np.radians(1.0)], 3)
-    assert kstest(unit.ravel(), "norm").pvalue > 1e-3
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -46,11 +31,6 @@ def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
     assert np.linalg.eigvalsh(raised[0] / unit).min() > 1 - 1e-9
     assert np.linalg.eigvalsh((raised - C)[0] / unit).min() > -1e-9
     assert (np.sqrt(np.diagonal(raised[0])) >= COVARIANCE_FLOOR * (1 - 1e-12)).all()
-
-
-def test_what_is_above_the_floor_is_left_alone() -> None:
-    C = np.tile(np.diag((3 * COVARIANCE_FLOOR) ** 2), (2, 1, 1))
-    assert_array_equal(floor_covariance(C), C)
 
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
@@ -82,10 +62,8 @@ def test_make_noise_by_name_class_function_and_object() -> None:
 @pytest.mark.parametrize(
     ("given", "noise_level", "message"),
     [
-        ("isotropc", NoiseLevel(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
         ("isotropic", NoiseLevel(1, float("nan")), "noise level nan degrees is not possible"),
         (lambda goals: goals, NoiseLevel(1, 1), "cannot be called with (assembly, shown, rng)"),
-        (object, NoiseLevel(1, 1), "the noise model 'object' failed"),
     ],
 )
 def test_what_make_noise_refuses(given: object, noise_level: NoiseLevel, message: str) -> None:
@@ -102,11 +80,8 @@ SKEWED[1, 0, 1] = 1e-7
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.Observation"),
         (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
-        (replace(GOOD, start={}), "changed which parts have a start pose"),
         (replace(GOOD, poses=1.1 * TOWER.goals), "pose of operation 1 that is not rigid"),
-        (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
     ],
 )
 def test_what_observe_refuses(returned: object, message: str) -> None:

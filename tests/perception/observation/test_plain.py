@@ -61,21 +61,6 @@ def test_declarations_that_are_missing_or_make_no_sense(given, message: str) -> 
     assert message in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("returned", "message"),
-    [
-        (None, "failed: poses of Observation"),
-        (np.zeros((3, 4, 4)), "pose of operation 1 that is not rigid"),
-        (TOWER.goals * np.nan, "failed: poses of Observation: every number must be finite"),
-    ],
-)
-def test_what_a_plain_function_must_not_return(returned: object, message: str) -> None:
-    model = make_noise(with_deviations(lambda goals, rng: returned, 1.0, 1.0), NOISE_LEVEL)
-    with pytest.raises(InputError, match="the noise model 'noise' ") as refused:
-        observe(SHOWN, model, np.random.default_rng(0))
-    assert message in str(refused.value)
-
-
 def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["noise", "list"]) == 0
     listing = capsys.readouterr().out
@@ -86,13 +71,3 @@ def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.Ca
         assert about.formula
         assert about.frame
         assert about.states
-
-
-def test_a_card_prints_what_the_model_does(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["noise", "show", "camera", "--noise-level", "2"]) == 0
-    text = capsys.readouterr().out
-    about = find_facts("camera")
-    assert text.startswith(f"# camera: {about.title}\n")
-    for line in (*about.formula, *about.parameters, about.frame, about.states, *about.notes):
-        assert line in text
-    assert "\nErrors at noise mm 2 and noise deg 2, 3000 operations of stick_in_tower:\n" in text

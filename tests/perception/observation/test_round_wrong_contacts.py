@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -54,19 +52,3 @@ def test_a_round_face_is_off_across_its_axis() -> None:
                 f"R{3 + (part == 'b')}",
             )
     assert seen == {"bore_shifted", "top_shifted"}
-
-
-def test_a_shaft_that_is_told_to_be_in_another_bore() -> None:
-    """Bores 12 mm beside each other: the other one is the only contact that could be taken for one."""
-    scene = rounds.peg_in_plate()
-    plate = scene.assembly.solids["plate"]
-    other = replace(plate.rounds["bore"], name="other", point=np.array([0.012, 0.0, 0.0]))
-    two = replace(plate, rounds={**plate.rounds, "other": other})
-    assembly = replace(scene.assembly, solids={**scene.assembly.solids, "plate": two})
-    added = {
-        str(contact)
-        for seed in range(20)
-        for _, contact in contacts(false(assembly, scene.start, scene.goals, np.random.default_rng(seed)))
-        - contacts(assembly)
-    }
-    assert "peg.wall on plate.other" in added

@@ -114,10 +114,3 @@ def test_relations_change_nothing_but_contacts_and_faces() -> None:
         with pytest.raises(InputError) as refused:
             replace_contacts(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
         assert words in str(refused.value)
-
-
-def test_no_contact_can_be_wrong_where_there_is_none() -> None:
-    scene = scenes.bridge()
-    bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
-    with pytest.raises(InputError, match="the assembly has no contact"):
-        missed(bare, scene.start, scene.goals, np.random.default_rng(0))

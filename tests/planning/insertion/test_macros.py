@@ -123,18 +123,6 @@ def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:
     )
 
 
-def test_a_block_between_two_walls_comes_from_above_unless_told_otherwise() -> None:
-    found = arrival(between())
-    (macro,) = found.macros
-    assert (found.state.letter, macro.name, macro.direction.tolist()) == ("B", "insert-between", [0, 0, -1])
-    assert macro.length_m == pytest.approx(0.05)
-    assert (found.line.travel_m, found.free) == (pytest.approx(0.07), True)
-    (noise_level,) = arrival(between(), Preference(X)).macros
-    assert (noise_level.name, noise_level.direction.tolist()) == ("insert-between", [1, 0, 0])
-    through = arrival(between(), Preference(Y))
-    assert through.macros[0].direction.tolist() == [0, 0, -1], "a line through a wall is not followed"
-
-
 def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
     contacts = {"castle": scenes.SLOT} | {name: pairs for name, pairs, _, _ in more if pairs}
     parts = {name: (solid, T) for name, _, solid, T in more}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,12 +10,11 @@ import pytest
 from apo_bench.assembly import compute_placements
 from apo_bench.geometry import Array
 from apo_bench.planning.insertion.arrival import Arrival, arrive, turning_state
-from apo_bench.planning.insertion.attach import Preference
 from apo_bench.planning.insertion.operation_macros import OperationMacros, understand
 from apo_bench.planning.insertion.surroundings import slide_directions
 from tests import rounds
 from tests.brackets import under_roof
-from tests.scenes import Scene, cuboid, mm
+from tests.scenes import Scene
 
 X, Y, Z = np.eye(3)
 
@@ -80,19 +78,6 @@ def test_what_turns_freely(name: str, screw: tuple[int, int, int]) -> None:
     """A shaft turns in its hole, a cone on a rim about all axes: as many directions are kept as no row fixes."""
     made = built(name)
     assert turning_state(made.assembly, last_of(made).after, poses_of(made)).all == screw
-
-
-def test_a_shaft_comes_by_the_end_of_its_bore_that_is_free() -> None:
-    made = built("through")
-    stop = {"stop": cuboid("stop", (20, 20, 20))}
-    for y, way in ((180.0, 1.0), (-180.0, -1.0)):
-        of = replace(made.assembly, solids={**made.assembly.solids, **stop}, fixed=frozenset({"table", "stop"}))
-        operation = of.operations[-1]
-        found = arrive(of, operation.moves, operation.contacts, poses_of(made) | {"stop": mm(0, y, 30)})
-        assert found.free
-        assert told(found) == [(INTO, [0.0, way, 0.0])]
-    across = arrive(of, operation.moves, operation.contacts, poses_of(made) | {"stop": mm(0, 500, 30)}, Preference(X))
-    assert abs(across.macros[0].direction[1]) == pytest.approx(1.0), "a line through a wall is not followed"
 
 
 @pytest.mark.parametrize("turned", [False, True])

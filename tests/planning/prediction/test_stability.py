@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from apo_bench.assembly import Operation
@@ -27,15 +26,6 @@ def test_the_examples_of_the_paper_and_round_parts_stand(build) -> None:
     assert first_unstable(scene.assembly, scene.start, scene.goals) is None
 
 
-@pytest.mark.parametrize("build", [scenes.stick_in_tower, rounds.in_groove, rounds.dovetail])
-def test_noise_alone_topples_nothing(build) -> None:
-    scene = build()
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        goals = scenes.noisy(scene.goals, rng, 1.0, 1.0)
-        assert first_unstable(scene.assembly, scene.start, goals) is None
-
-
 @pytest.mark.parametrize(("beyond_mm", "expected"), [(-1.0, None), (1.0, 1)])
 def test_castle_over_the_edge_of_the_table(beyond_mm: float, expected: int | None) -> None:
     """The table ends at x = 700; the centre of the castle decides."""
@@ -53,15 +43,6 @@ def test_stick_whose_centre_lies_beside_its_supports(along_mm: float, expected: 
 def test_stick_in_a_closed_hole_is_held_like_a_cantilever() -> None:
     """Its centre hangs 60 mm out; the floor pushes up at the mouth, the ceiling down at the far end."""
     assert falls(scenes.stick_in_tower(), 3, scenes.mm(60, 0, 0)) is None
-
-
-@pytest.mark.parametrize("pairs", [(), ("py-spy", "ny-sny")])
-def test_without_floor_or_ceiling_nothing_is_claimed(pairs: tuple[str, ...]) -> None:
-    held = Operation("stick", scenes.touch("stick", "castle1", *pairs))
-    operations = (*scenes.stick_on_castles().assembly.operations[:2], held)
-    solids = [scenes.table(), scenes.castle("castle1"), scenes.castle("castle2"), scenes.stick()]
-    scene = scenes.scene(solids, operations, list(scenes.stick_on_castles().goals))
-    assert falls(scene, 3, scenes.mm(0, 0, 200)) is None
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Solid
 from apo_bench.scenario.parts import load_part
-from apo_bench.scenario.parts.checking import check_matter
 from apo_bench.scenario.parts.making import (
     Body,
-    Edge,
     Frustum,
     bore,
     build_solid,
@@ -29,7 +27,6 @@ from apo_bench.scenario.parts.making import (
     round_corners,
     write_part,
 )
-from apo_bench.scenario.parts.making.outline import outline_moments, trace_outline
 
 FREE_MM = 0.005
 SHARE = 1e-3
@@ -173,7 +170,7 @@ def check_walls(solid: Solid, wanted: Wanted) -> None:
         assert face.outline @ n == pytest.approx(np.full(len(face.outline), 1e-3 * distance + n @ t), abs=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(45))
+@pytest.mark.parametrize("seed", range(15))
 def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
     wanted = random_solid(seed)
     solid = build_solid("thing", wanted.body)
@@ -189,27 +186,3 @@ def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
 def wall_area(wanted: Wanted) -> float:
     """Of all round walls, [m^2]."""
     return sum(2 * np.pi * 1e-3 * r * 1e-3 * (b - a) for _, r, a, b, _ in wanted.walls.values())
-
-
-def test_the_mesh_of_the_pieces_agrees_with_centroid_and_inertia():
-    for seed in range(3):
-        wanted = random_solid(seed)
-        check_matter(build_solid("thing", wanted.body), "thing.toml", 1e-3 * FREE_MM * wall_area(wanted))
-
-
-def test_moments_of_arcs_are_those_of_many_corners():
-    for outline in (
-        round_corners(make_polygon((0, 0), (40, 0), (40, 20), (25, 20), (25, 50), (0, 50)), 4.0),
-        make_slot(30, 8, (5, -7)),
-        [Edge((10, 0), center=(0, 0)), Edge((0, 10), center=(0, 0)), Edge((-10, 0)), Edge((0, -4))],
-    ):
-        fine = [Edge(e.start, e.name, e.fit, e.center, e.clockwise, 100_000) for e in outline]
-        corners = trace_outline(fine)
-        x, y = corners.T
-        u, v = np.roll(corners, -1, axis=0).T
-        c = x * v - u * y
-        exact = outline_moments(outline)
-        assert exact.size == pytest.approx(c.sum() / 2, rel=1e-8)
-        assert exact.first == pytest.approx([(x + u) @ c / 6, (y + v) @ c / 6], rel=1e-7)
-        assert exact.second[0, 0] == pytest.approx((x * x + x * u + u * u) @ c / 12, rel=1e-7)
-        assert exact.second[0, 1] == pytest.approx((x * v + 2 * x * y + 2 * u * v + u * y) @ c / 24, rel=1e-6)

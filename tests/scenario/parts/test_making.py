@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Box, shrink_pieces
+from apo_bench.geometry import Box
 from apo_bench.scenario.parts import load_part
 from apo_bench.scenario.parts.making import (
     Body,
-    Edge,
     Frustum,
     bore,
     build_solid,
@@ -100,63 +98,6 @@ def test_a_part_that_is_written_is_read_as_the_same_solid(name: str, tmp_path: P
         assert same.extent_rad == pytest.approx(wall.extent_rad, abs=1e-9)
     if not all(isinstance(piece, Box) for piece in found.pieces):
         assert found.inertia == pytest.approx(wanted.inertia, rel=1e-9, abs=1e-20)
-
-
-def test_volumes_are_exact():
-    assert BODIES["plate"].moments.size == pytest.approx(
-        1e-9 * (60 * 40 * 20 - np.pi * (5.1**2 * 19.5 + 0.5 * (5.1**2 + 5.1 * 5.6 + 5.6**2) / 3)), rel=1e-12
-    )
-    flat = 120 * 80 - (22 * 8 + np.pi * 16)
-    assert base().moments.size == pytest.approx(
-        1e-9 * (flat * 15 - 3 * np.pi * 4.05**2 * 10 - np.pi * 4 * 15), rel=1e-12
-    )
-    assert bush().moments.size == pytest.approx(1e-9 * np.pi * (81 * 3 + 49 * 17 - 25 * 20), rel=1e-12)
-
-
-def test_pieces_keep_a_bore_free_and_leave_no_gap_beside_it():
-    middle = np.array([0.005, -0.003])
-    walls = [p.corners[:, :2] - middle for p in build_solid("plate", plate()).pieces]
-    near = min(float(np.linalg.norm(corners, axis=1).min()) for corners in walls)
-    assert 0.0051 < near < 0.0051 + 6e-6
-
-
-def free_radius(pieces, middle: np.ndarray) -> float:
-    """How near pieces of prisms along z come to an axis along z, [m]."""
-    import shapely
-
-    return min(shapely.MultiPoint(p.corners[:, :2]).convex_hull.distance(shapely.Point(middle)) for p in pieces)
-
-
-def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
-    outline = make_polygon((0, 0), (30, 0), (30, 30), (15, 15.08), (0, 30))
-    body = extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 0, 8, "bore")])
-    solid = load_part(write_part("tight", body, tmp_path, source="a test", licence="Apache-2.0"))
-    assert list(solid.rounds) == ["bore"]
-    assert free_radius(solid.pieces, np.array([0.015, 0.008])) == pytest.approx(0.007, abs=1e-9)
-    with pytest.raises(ValueError, match="no convex area around the bore"):
-        extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 2, 8, sides=96)])
-
-
-def test_holes_that_meet_are_refused():
-    for bores in ([bore((0, 0), 5, 0, 9), bore((9, 0), 5, 0, 9)], [bore((16, 0), 5, 0, 9)]):
-        with pytest.raises(ValueError, match="none of which meet"):
-            extrude(make_rectangle(40, 40), 0, 9, bores=bores)
-    with pytest.raises(ValueError, match="is no arc"):
-        extrude([Edge((0, 0)), Edge((10, 0), center=(0, 1)), Edge((10, 10))], 0, 9)
-    with pytest.raises(ValueError, match="faces with one name"):
-        build_solid("thing", join(plate(), plate().moved((0, 100, 0))))
-
-
-@pytest.mark.parametrize("clearance_mm", [0.05, 0.25])
-def test_bores_and_slots_that_fit_get_wider_by_the_clearance(clearance_mm: float):
-    holes = [make_slot(20, 8, (0, -20), names=("low", "right", "high", "left"), fit=True)]
-    hole = bore((0, 10), 5, 0, 12, "bore", fit=True, sides=64)
-    body = extrude(make_rectangle(60, 70), 0, 12, holes=holes, bores=[hole])
-    made = shrink_pieces(build_solid("thing", body), 1e-3 * clearance_mm)
-    assert free_radius(made, np.array([0.0, 0.010])) == pytest.approx(0.005 + 1e-3 * clearance_mm, abs=1e-8)
-    for x in (-0.006, 0.0, 0.006):
-        assert free_radius(made, np.array([x, -0.020])) == pytest.approx(0.004 + 1e-3 * clearance_mm, abs=1e-8)
-    assert max(float(np.abs(p.corners).max()) for p in made) == pytest.approx(0.035, abs=1e-9)
 
 
 def test_a_rim_is_a_face_of_its_own(tmp_path: Path):

@@ -25,6 +25,8 @@ class Section(NamedTuple):
     heading: str
     blocks: Sequence[tuple[str, Any]]
     """What stands in it, each with the name of the macro of the template that shows it."""
+    open: bool = False
+    """Whether it is unfolded when the page opens."""
 
 
 def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:

@@ -63,9 +63,10 @@ def report_page(c: Contents) -> str:
     matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
     differences = [name for name in c.figures if name.startswith("difference_to_")]
     over = ("success_over_noise_level", "success_over_tightness", "success_over_reobservations")
+    half = ("folded", ("Noise level at half of the success", c.tables["half_levels"]))
     sections = [
-        Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)]),
-        Section("levels", "Success over noise level", [("text", _BANDS), *_shown(c, over, "half_levels")]),
+        Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)], open=True),
+        Section("levels", "Success over noise level", [*_shown(c, over), ("text", _BANDS), half], open=True),
         Section("pairs", "Paired differences", _shown(c, differences, "pairs")),
         Section("stages", "Stages of failures", _shown(c, ("failure_stages",))),
         Section("pictures", "Failures", _pictures(c)),

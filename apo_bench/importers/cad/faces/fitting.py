@@ -171,7 +171,7 @@ def plane_region(triangles: Any, normal: Array, point: Array) -> Region:
 
 def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
     """Return triangles on a cylinder or a cone, with the ends of it."""
-    # An axis has no sense of its own: its largest component is taken as positive, and its point is the foot of the
+    # An axis has no sense: its largest component is taken as positive, and its point is the foot of the
     # origin, so that one file gives the same numbers each time.
     axis = surface.axis * np.sign(surface.axis[int(np.abs(surface.axis).argmax())])
     slope = surface.slope * float(np.sign(axis @ surface.axis))

@@ -19,7 +19,7 @@ _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
 def read_stl(path: Path, raw: bytes) -> Mesh:
-    """Read the triangles of a file, each with three corners of its own.
+    """Read the triangles of a file, each with its own three corners.
 
     Raises:
         InputError: It is no STL file, or ends within its triangles.

@@ -74,7 +74,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
         hulls += abs(coarse_volume - true + kept_volume - fine_volume) > _LOSS * true
         outlines.append(corners)
     kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
-    # Holes of screws that nobody drew: of too many holes, those that nothing comes near to are filled.
+    # Holes of screws that were not drawn: of too many holes, those that nothing comes near to are filled.
     while others is not None and kept and least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
         kept.pop()
     pieces = _bore(outlines, kept, flats)

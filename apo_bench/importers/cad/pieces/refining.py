@@ -1,4 +1,4 @@
-"""Cut the parts of hollow free shapes on until their hulls keep out of the space beside the solid, [mm].
+"""Cut the parts of hollow free shapes on until their hulls keep out of the space around the solid, [mm].
 
 A part becomes one piece, its convex hull. Where the surface of the solid lies inside of that hull, the hull fills free
 space that other solids may need. So the part is cut through the deepest such point, again and again.
@@ -26,7 +26,7 @@ _NEAR_MM = 1.0
 """Other solids come near within this distance."""
 _ALONE = 150
 _TOGETHER = 300
-"""The largest number of pieces of a solid alone, and of one beside others; half as many more beyond its flat cuts."""
+"""The largest number of pieces of a solid alone, and of one among others; half as many more beyond its flat cuts."""
 _AT_ONCE = 2_000_000
 """The number of distances that are computed together, which bounds the memory."""
 

@@ -1,4 +1,4 @@
-"""A camera: the frames of the rays on which it sees parts.
+"""A camera: the frames of the rays from it to the parts.
 
 The camera's axes are those of OpenCV: x to the right, y down, z along the optical axis. The frame of a ray is that of
 the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).
@@ -37,7 +37,7 @@ def _default_pose() -> Array:
 @final
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A camera: its pose in the world, and the rays on which it sees parts."""
+    """A camera: its pose in the world, and the rays from it to the parts."""
 
     T_world_camera: Array = field(default_factory=_default_pose)
     """(4, 4), axes of OpenCV, [m]."""
@@ -71,7 +71,7 @@ class Camera:
     def twists(self, poses: Array, errors: Array) -> Array:
         """Body twists (n, 6) of errors that are given in the frames of the rays.
 
-        Turn first, then shift in the frame that is seen: xi = (R_seen^t F d, R^t F w), R_seen = R exp(R^t F w). The
+        Turn first, then shift in the frame that is observed: xi = (R_obs^t F d, R^t F w), R_obs = R exp(R^t F w). The
         twist is thus linear in the error, and with covariance S in the frame of the ray its own is exactly that of
         `covariance` for that ray, since a turn leaves its own axis where it is.
 
@@ -82,18 +82,18 @@ class Camera:
         frames = self.frames(poses)
         turn = np.zeros((len(poses), 6))
         turn[:, 3:] = np.einsum("nji,njk,nk->ni", poses[:, :3, :3], frames, errors[:, 3:])
-        R_seen = (poses @ pose.exp(turn))[:, :3, :3]
-        shift = np.einsum("nji,njk,nk->ni", R_seen, frames, errors[:, :3])
+        R_obs = (poses @ pose.exp(turn))[:, :3, :3]
+        shift = np.einsum("nji,njk,nk->ni", R_obs, frames, errors[:, :3])
         return np.concatenate([shift, turn[:, 3:]], axis=1)
 
     def covariance(self, seen: Array, errors: Array) -> Array:
         """The body covariance (n, 6, 6) of errors whose covariance in the frames of the rays is known.
 
-        Computed for the rays on which parts are seen, so that nothing of the truth is in it. Those differ from the
+        Computed for the rays on which parts are observed, so that nothing of the truth is in it. Those differ from the
         true ones by the error across over the distance, a thousandth for a millimetre.
 
         Args:
-            seen: (n, 4, 4), where the parts are seen, world frame, [m].
+            seen: (n, 4, 4), where the parts are observed, world frame, [m].
             errors: (6, 6) or (n, 6, 6), of (x, y, along; rx, ry, about), [m, rad].
         """
         turned = np.swapaxes(seen[:, :3, :3], 1, 2) @ self.frames(seen)

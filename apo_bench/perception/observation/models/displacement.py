@@ -16,7 +16,7 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
     """Observe every pose at `T exp(xi)`, with the covariance of xi and of the human error, and at least the floor.
 
     Args:
-        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
+        xi: (n, 6), body twists; where one is zero the pose is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
     poses = displace(demonstration.poses, xi)
@@ -25,7 +25,7 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
 
 
 def displace(poses: Array, xi: Array) -> Array:
-    """`T exp(xi)` of poses (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
+    """`T exp(xi)` of poses (n, 4, 4); where a twist is zero the pose as it is, bit for bit."""
     return np.where(np.any(xi, axis=1, keepdims=True)[..., None], poses @ pose.exp(xi), poses)
 
 
@@ -36,20 +36,20 @@ def observe_shared(
     own: Array,
     shared: Callable[[Array], Sequence[SharedError]],
 ) -> Observation:
-    """Every goal seen at `T exp(xi)`, by errors of which operations share most.
+    """Every pose observed at `T exp(xi)`, by errors of which operations share most.
 
     Args:
-        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
+        xi: (n, 6), body twists; where one is zero the pose is the one that was shown, bit for bit.
         own: (6,), standard deviation of what of xi operations do not share, [m, rad]. Without any, operations would be
-            told to agree without an error, which no camera does.
-        shared: The poses that are seen, (n, 4, 4) -> what operations share.
+            stated to agree without an error, which no camera does.
+        shared: The poses that are observed, (n, 4, 4) -> what operations share.
     """
     seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
     return add_shared_error(seen, *shared(seen.poses)) if own.any() else seen
 
 
 def add_shared_error(observation: Observation, *shared: SharedError) -> Observation:
-    """An observation that states, beside what it states already, errors that operations share."""
+    """An observation that states, in addition to what it states already, errors that operations share."""
     stated = np.array(observation.covariance)
     for error in shared:
         stated[list(error.operations)] += error.added(observation.poses)

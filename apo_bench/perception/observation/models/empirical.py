@@ -32,7 +32,7 @@ _LARGEST_DEG = 180.01
 @final
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Residuals to draw from, as errors in the frames of rays, [m, rad], whose shift acts in the frame that is seen."""
+    """Residuals to draw from, as errors in the frames of rays, [m, rad]; a shift acts in the observed frame."""
 
     inliers: Array
     """(k, 6), those that are not turned."""
@@ -60,7 +60,7 @@ class EmpiricalNoise:
 
     It is taken as it is or with the opposite sign, both equally often, so that it is 0 in the mean: a bias of the
     estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
-    is not known, as the part looks alike when turned, are left out.
+    is not known, as the part looks the same when turned, are left out.
     """
 
     sample: Sample
@@ -69,10 +69,10 @@ class EmpiricalNoise:
 
     FACTS: ClassVar[Facts] = Facts(
         title="the residuals of a pose estimator themselves, drawn at random",
-        formula=("T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w), (d, w) = L times a residual, or minus that",),
+        formula=("T_obs = T exp(xi), xi = (R_obs^t F d, R^t F w), (d, w) = L times a residual, or minus that",),
         frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
-        parameters=("all in the file: the residuals, which of them are outliers, and how many parts were missed",),
-        states="the mean square of the residuals of what is no outlier, turned into the part that is seen",
+        parameters=("all in the file: residuals, which of them are outliers, and the share of missed parts",),
+        states="the mean square of the residuals of inliers, in the frame of the observed part",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
         measured=True,
     )

@@ -19,7 +19,7 @@ class NoiseLevel(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """The attribute `FACTS` of a noise model: what its card prints. Models that bring none have their docstring."""
+    """The attribute `FACTS` of a noise model: what its sheet prints. Models that bring none have their docstring."""
 
     title: str
     formula: tuple[str, ...]

@@ -19,7 +19,7 @@ from apo_bench.perception.observation.models.displacement import observe_displac
 from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 RATE = 0.3
-"""Share of operations that are seen falsely."""
+"""Share of operations that are observed wrongly."""
 NEAREST_M = 0.02
 FARTHEST_M = 0.06
 """An error along the ray."""
@@ -72,19 +72,19 @@ class CameraFailures:
 
     @property
     def FACTS(self) -> Facts:
-        """What its card prints."""
+        """What its sheet prints."""
         formula = ", or ".join(failure.formula for failure in self.failures)
         notes = [note for failure in self.failures for note in failure.notes]
         return Facts(
             title=", or ".join(failure.title for failure in self.failures),
-            formula=(f"T_seen = S exp(L e), {formula} of a failure, else S = T",),
-            frame="of the part that is seen, the same in every direction",
+            formula=(f"T_obs = S exp(L e); S = T, but of a failure {formula}",),
+            frame="of the observed part, isotropic",
             parameters=(
-                f"p = {RATE:g} if nothing else is stated: share of operations that fail",
-                "r = 0 if nothing else is stated: probability that a later look repeats what was false in the first",
+                f"p = {RATE:g} by default: share of operations that fail",
+                "r = 0 by default: probability that a reobservation repeats the failure",
             ),
-            states="L^2, the covariance of what is no failure, with p, r and where the camera stands",
-            notes=(*notes, "At level 0 nothing fails; how far a failure is off does not depend on the level"),
+            states="L^2, the covariance without failures, with p, r and the place of the camera",
+            notes=(*notes, "At level 0 nothing fails; the size of a failure does not depend on the level"),
         )
 
     @property
@@ -134,7 +134,7 @@ def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
 
 
 def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
+    """Parts are observed turned by an approximate symmetry, T F; a part without one is observed correctly."""
     assembly = shown.assembly
     for k in draw_failing(len(poses), rate, rng):
         turns = find_approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
@@ -143,7 +143,7 @@ def _flip(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _leave_behind(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen where they were before the operation moved them."""
+    """Parts are observed where they were before the operation moved them."""
     before = (shown.start, *compute_placements(shown.assembly, shown.start, shown.poses))
     for k in draw_failing(len(poses), rate, rng):
         poses[k] = before[k][shown.assembly.operations[k].main]
@@ -166,7 +166,7 @@ def _swap(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: 
 
 
 def _shift_along_ray(poses: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
-    """Parts are seen 20 to 60 mm too near or too far, on the ray of the camera."""
+    """Parts are observed 20 to 60 mm too near or too far, on the ray of the camera."""
     rays = camera.rays(poses)
     for k in draw_failing(len(poses), rate, rng):
         poses[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)
@@ -189,34 +189,34 @@ PRESETS: Mapping[str, Failure] = MappingProxyType(
     {
         "flips": Failure(
             _flip,
-            "parts that nearly look the same after a turn are seen turned",
+            "parts that look nearly the same after a turn are observed turned",
             "S = T F, F one of the turns after which the part nearly fills the same space",
-            ("A part without such a turn is seen rightly",),
+            ("A part without such a turn is observed correctly",),
         ),
         "stale": Failure(
             _leave_behind,
-            "parts are seen where they were before they were moved",
+            "parts are observed where they were before the operation",
             "S the pose of the part before the operation",
         ),
         "swaps": Failure(
             _swap,
-            "two parts are taken for each other",
-            "S the pose of another operation, which has this one's",
-            ("Operations on like parts are exchanged, of any two parts where none have one shape",),
+            "two parts are confused",
+            "S the pose of another operation, which gets this one's",
+            ("Operations on parts of one shape are exchanged, or of any two parts if there are none",),
             by_part=False,
         ),
         "rays": Failure(
             _shift_along_ray,
-            "parts are seen too near or too far",
+            "parts are observed too near or too far",
             f"S = T shifted by {1e3 * NEAREST_M:g} to {1e3 * FARTHEST_M:g} mm towards the camera or away",
         ),
         "displaced-view": Failure(
             _displace_view,
-            "operations in a row are displaced together",
+            "consecutive operations are displaced together",
             "S = P exp(c) P^-1 T, P the axes of the camera in the middle of them, one c",
             (
                 f"c: {1e3 * VIEW_SHIFT_M:g} mm and {np.degrees(VIEW_TURN_RAD):g} deg along and about each axis",
-                "As many as p says, two at least",
+                "A share p of the operations, at least two",
             ),
             by_part=False,
         ),

@@ -53,10 +53,10 @@ class MeasuredNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class FittedNoise:
-    """Every goal is seen at `T exp(xi)`, xi of the error (x, y, along; rx, ry, about) that is drawn in its ray's frame.
+    """Every pose is observed at `T exp(xi)`, xi of an error (x, y, along; rx, ry, about) in the frame of its ray.
 
     Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
-    changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
+    changes which operations are outliers or missed, but at level 0 all is observed as shown. The covariance is that of
     inliers; an observation does not know which of its poses are outliers, only how often there are any.
     """
 
@@ -65,15 +65,16 @@ class FittedNoise:
     camera: Camera = field(default_factory=Camera)
 
     FACTS: ClassVar[Facts] = Facts(
-        title="the tails, outliers and misses that were fitted to a pose estimator",
+        title="tails, outliers and misses fitted to a pose estimator",
         formula=(
-            "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
-            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2), w alike; no |d|, |w| above its limit",
+            "T_obs = T exp(xi), xi = (R_obs^t F d, R^t F w)",
+            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2); w likewise",
+            "no |d|, |w| above its limit",
             "of an outlier: |d| log-uniform from the limit to the farthest, any direction, any turn; times L",
         ),
         frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
         parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
-        states="that of what is no outlier, within the limits, turned into the part that is seen, and its tails",
+        states="the covariance of inliers within the limits, in the frame of the part, and the tails",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
         measured=True,
     )
@@ -119,7 +120,7 @@ def restate(observation: Observation, measured: MeasuredNoise, camera: Camera) -
 
 
 def stated_tails(measured: MeasuredNoise, noise_level: NoiseLevel, camera: Camera, poses: Array) -> Tails:
-    """The tails of inliers, in the frames of the rays on which parts are seen."""
+    """The tails of inliers, in the frames of the rays on which parts are observed."""
     shift = measured.shift_mm
     turn = measured.turn_deg
     units = np.repeat(LEVEL_UNITS[[0, 3]] * noise_level, 2)
@@ -163,7 +164,7 @@ def observe_in_ray_frames(
 
     Args:
         errors: (n, 6), at level 1, in the frames of the rays: (x, y, along; rx, ry, about), [m, rad].
-        covariance: (6, 6), of inliers, alike.
+        covariance: (6, 6), of inliers.
         missed: (n,), what nothing is found for.
     """
     scale = np.repeat([noise_level.mm, noise_level.deg], 3)

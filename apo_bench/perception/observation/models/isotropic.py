@@ -22,7 +22,7 @@ _FARTHEST = 1e6
 @final
 @dataclass(frozen=True)
 class IsotropicNoise:
-    """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
+    """Every pose is observed at `T exp(xi)`, xi a Gaussian body twist of zero mean.
 
     Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
     exactly zero: the poses are then those that were shown, bit for bit.
@@ -32,10 +32,10 @@ class IsotropicNoise:
 
     FACTS: ClassVar[Facts] = Facts(
         title="the same in every direction",
-        formula=("T_seen = T exp(L e)",),
-        frame="of the part that is seen",
+        formula=("T_obs = T exp(L e)",),
+        frame="of the observed part",
         parameters=(),
-        states="L^2 in every direction, which is exact",
+        states="L^2 in every direction, exact",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -56,9 +56,9 @@ class PerPartNoise:
     noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
-        title="some parts are seen much worse than others",
-        formula=("T_seen = T exp(L f_part e)",),
-        frame="of the part that is seen, the same in every direction",
+        title="some parts have much larger errors than others",
+        formula=("T_obs = T exp(L f_part e)",),
+        frame="of the observed part, isotropic",
         parameters=(
             f"f = {LEAST_FACTOR:g} to {MOST_FACTOR:g}, log-uniform: factor of a part, drawn per trial, for all its "
             "operations",
@@ -88,9 +88,9 @@ class HeavyTailedNoise:
     """Above 2, below which there is no covariance."""
 
     FACTS: ClassVar[Facts] = Facts(
-        title="Student t of one scale per operation: few errors are far too large",
-        formula=("T_seen = T exp(L e sqrt((nu - 2) / c))", "c ~ chi-square(nu), one per operation"),
-        frame="of the part that is seen, the same in every direction",
+        title="Student t with one scale per operation: a few errors are very large",
+        formula=("T_obs = T exp(L e sqrt((nu - 2) / c))", "c ~ chi-square(nu), one per operation"),
+        frame="of the observed part, isotropic",
         parameters=(f"nu = {FREEDOM:g}: degrees of freedom, above 2",),
         states="L^2 in every direction, the true covariance, and the tails",
     )

@@ -13,11 +13,11 @@ from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OUTLIERS = 0.1
 MISSES = 0.02
-"""Share of operations that are seen quite wrongly, and that are not seen."""
+"""Share of operations that are observed quite wrongly, and that are not observed."""
 OUTLIER_TIMES = 10.0
 """An outlier errs by so many times the level."""
 UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
-"""Standard deviation that is stated of what was not seen, [m, rad]."""
+"""Standard deviation that is stated of what was not observed, [m, rad]."""
 
 
 @final
@@ -25,9 +25,8 @@ UNSEEN_DEVIATION = copy_frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
 class OutlierNoise:
     """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
-    What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
-    it is wrong. Shares do not depend on the level:
-    the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
+    The stated covariance is that of inliers. The same operations are outliers and missed at every level, but for level
+    0, at which everything is observed as shown.
     """
 
     noise_level: NoiseLevel
@@ -36,21 +35,21 @@ class OutlierNoise:
     times: float = OUTLIER_TIMES
 
     FACTS: ClassVar[Facts] = Facts(
-        title="gross outliers that do not say so, and operations that are missed",
-        formula=("T_seen = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: seen = false"),
-        frame="of the part that is seen, the same in every direction",
+        title="gross outliers that are not marked, and missed operations",
+        formula=("T_obs = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: observed = false"),
+        frame="of the observed part, isotropic",
         parameters=(
-            f"p = {OUTLIERS:g}: share of outliers among what is seen",
+            f"p = {OUTLIERS:g}: share of outliers among the observed operations",
             f"q = {MISSES:g}: share of misses",
             f"m = {OUTLIER_TIMES:g}: an outlier errs m times as much",
         ),
         states=(
-            f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
+            f"L^2, the covariance of inliers; that of all errors is 1 + p (m^2 - 1) = "
             f"{1.0 + OUTLIERS * (OUTLIER_TIMES**2 - 1.0):g} times as large"
         ),
         notes=(
-            f"A missed operation has the pose at which its part was seen last, or started, with "
-            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods refuse it",
+            f"A missed operation has the last observed pose of its part, or its start, with "
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods reject it",
             "At level 0 nothing is missed",
         ),
     )
@@ -71,7 +70,7 @@ class OutlierNoise:
 
 
 def find_last_seen(assembly: Assembly, start: Poses, poses: Array, seen: NDArray[np.bool_]) -> Array:
-    """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
+    """The last observed pose of the part of each operation, or its start, (n, 4, 4)."""
     now = dict(start)
     out = poses.copy()
     for k, operation in enumerate(assembly.operations):

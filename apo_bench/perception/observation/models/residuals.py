@@ -108,8 +108,8 @@ class Residuals:
 def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     """Match estimates to the truth and say how far off they are; those of images without truth do not count.
 
-    Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
-    least (the Hungarian method), however far off: what is gross is told afterwards by `INLIER_MM`. Scores do not count.
+    Per image and object, every part that was there gets its own estimate so that the distances add up to the
+    least (the Hungarian method), however far off: `INLIER_MM` marks what is gross afterwards. Scores do not count.
     Rotations are the nearest ones to the matrices as written.
     """
     from scipy.spatial.transform import Rotation
@@ -123,18 +123,18 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
     R = truth.R[found]
-    R_seen = estimates.R[partner[found]]
+    R_obs = estimates.R[partner[found]]
     right = pose.nearest_rotations(R)
-    turn = Rotation.from_matrix(pose.nearest_rotations(R_seen) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
+    turn = Rotation.from_matrix(pose.nearest_rotations(R_obs) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
     moved = estimates.t_mm[partner[found]] - truth.t_mm[found]
-    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_seen))
+    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_obs))
     shift[found] = np.einsum("nji,nj->ni", F, moved)
     turned[found] = np.einsum("nji,nj->ni", F, turn)
-    # trace(R_seen R^t) = 1 + 2 cos(angle).
+    # trace(R_obs R^t) = 1 + 2 cos(angle).
     trace = np.full(n, np.nan)
-    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_seen, R) - 1.0) / 2.0, -1.0, 1.0)))
+    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_obs, R) - 1.0) / 2.0, -1.0, 1.0)))
     return Residuals(
         where=truth.where,
         shift_mm=shift,
@@ -149,24 +149,24 @@ def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
 
 
 def _about_fixed_points(
-    objects: NDArray[np.int64], moved: Array, R: Array, R_seen: Array
+    objects: NDArray[np.int64], moved: Array, R: Array, R_obs: Array
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which gross estimates only turn a part about a point that is fixed in it, and all shifts, of theirs that point.
 
-    A part that looks the same when turned about an axis beside its origin is seen with its origin far off, though it
+    A part that looks the same when turned about an axis off its origin is observed with its origin far off, though it
     stands where it is. Every symmetry keeps a point c, so the turned estimates of one object agree on it: (R - I) c + t
     is as small as the errors of those that are upright.
 
     Args:
         objects: (n,), of each estimate.
         moved: (n, 3), from the true to the estimated origin, camera axes, mm.
-        R: (n, 3, 3), true rotations; R_seen are the estimated ones.
+        R: (n, 3, 3), true rotations; R_obs are the estimated ones.
 
     Returns:
         (n,) and (n, 3), mm.
     """
     off = np.linalg.norm(moved, axis=1)
-    D = np.swapaxes(R, 1, 2) @ R_seen - np.eye(3)
+    D = np.swapaxes(R, 1, 2) @ R_obs - np.eye(3)
     t = np.einsum("nji,nj->ni", R, moved)
     # |R - I| = 2 sqrt(2) sin(angle / 2) for the Frobenius norm.
     is_turned = np.linalg.norm(D, axis=(1, 2)) >= 2.0 * np.sqrt(2.0) * np.sin(np.radians(TURNED_DEG) / 2.0)
@@ -187,7 +187,7 @@ def _about_fixed_points(
                 break
             c = np.linalg.lstsq(D[agree].reshape(-1, 3), -t[agree].reshape(-1), rcond=0.1)[0]
             stands = left[_point_off(D[left], t[left], c) < INLIER_MM]
-            shifts[stands] = moved[stands] + (R_seen[stands] - R[stands]) @ c
+            shifts[stands] = moved[stands] + (R_obs[stands] - R[stands]) @ c
             beside[stands] = True
             left = np.setdiff1d(left, np.union1d(stands, agree))
     return beside, shifts

@@ -13,7 +13,7 @@ from apo_bench.perception.observation.models.facts import Facts, NoiseLevel
 
 OWN = 1.0 / 20.0
 """What operations that share an error err by themselves, as part of the level."""
-OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
+OWN_FACT = f"o = {OWN:g}: independent error of each operation over the level"
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""
 
@@ -24,17 +24,17 @@ class BiasNoise:
     """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
 
     Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
-    operations for independent ones are told too much.
+    operations for independent ones assume too much.
     """
 
     noise_level: NoiseLevel
 
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error per part, the same in every operation that moves it",
-        formula=("T_seen_k = T_k exp(L e_part + o L e_k)",),
+        formula=("T_obs_k = T_k exp(L e_part + o L e_k)",),
         frame="of the part: as if the origin of its model were in the wrong place",
         parameters=(OWN_FACT,),
-        states="(1 + o^2) L^2 in every direction, over seeds, and that operations share L^2 of it, one error per part",
+        states="(1 + o^2) L^2 in every direction, of which operations of one part share L^2",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -55,13 +55,13 @@ class BiasNoise:
 @final
 @dataclass(frozen=True, eq=False)
 class ViewBiasNoise:
-    """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
+    """One displacement E of the world, drawn per trial, takes every part to where it is observed, but for a small part.
 
-    What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
+    Poses of parts relative to each other are nearly exact, those relative to the fixed parts are not. E turns about
     the middle of the operations' poses, where its size is the level; about the camera, a degree would be 16 mm.
     The twist by which an operation is wrong, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same
-    computed from shown poses and from seen ones. What is stated is about the middle of what was seen, so that nothing
-    of the truth is in it; seen from there, e has the same distribution.
+    computed from shown poses and from observed ones. What is stated is about the middle of the observed poses, so that
+    nothing of the truth is in it; seen from there, e has the same distribution.
     """
 
     noise_level: NoiseLevel
@@ -69,11 +69,10 @@ class ViewBiasNoise:
 
     FACTS: ClassVar[Facts] = Facts(
         title="one constant error of the view, common to all parts and operations",
-        formula=("T_seen_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
+        formula=("T_obs_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
         frame="P with the axes of the camera, in the middle of all poses",
         parameters=(OWN_FACT,),
-        states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, over seeds, and that operations share the first: parts far "
-        "from the middle are less well placed",
+        states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, of which operations share the first term",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -106,10 +105,10 @@ class CorrelatedNoise:
 
     FACTS: ClassVar[Facts] = Facts(
         title="errors that drift: correlated from operation to operation",
-        formula=("z_1 = e_1, z_k = rho z_(k-1) + sqrt(1 - rho^2) e_k", "T_seen_k = T_k exp(L A_k^t z_k + o L e_k)"),
+        formula=("z_1 = e_1, z_k = rho z_(k-1) + sqrt(1 - rho^2) e_k", "T_obs_k = T_k exp(L A_k^t z_k + o L e_k)"),
         frame="the axes of the camera, into which A_k turns those of the part",
         parameters=(f"rho = {CORRELATION:g}: correlation of the errors of an operation and the next", OWN_FACT),
-        states="(1 + o^2) L^2 in every direction for each operation, and how operations are correlated; both are exact",
+        states="(1 + o^2) L^2 in every direction and the correlation of operations, both exact",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
@@ -117,12 +116,12 @@ class CorrelatedNoise:
         unit, own = rng.standard_normal((2, len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]
-        # From the axes of the camera into those of the part: the turn by R^t as it is, the shift by R^t as it is seen.
+        # From the axes of the camera into those of the part: the turn by R^t, the shift by the observed R^t.
         in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
         xi = np.zeros((len(assembly), 6))
         xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.poses[:, :3, :3], in_world[:, 1])
-        R_seen = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
-        xi[:, :3] = np.einsum("nji,nj->ni", R_seen, in_world[:, 0])
+        R_obs = (demonstration.poses @ pose.exp(xi))[:, :3, :3]
+        xi[:, :3] = np.einsum("nji,nj->ni", R_obs, in_world[:, 0])
 
         def shared(poses: Array) -> list[SharedError]:
             every = tuple(range(len(assembly)))

@@ -28,14 +28,14 @@ IN_IMAGE = 0.5
 @final
 @dataclass(frozen=True)
 class AnisotropicNoise:
-    """Every goal is seen at `T exp(xi)`; turned into the world, xi is Gaussian with axes along and across the sight.
+    """Every pose is observed at `T exp(xi)`; in the world xi is Gaussian with axes along and across the sight.
 
     A camera finds depth less well than the place in the image, and a turn that tilts a part out of the image less
     well than one within it. The geometric means of the factors, 0.91 for positions and 1 for turns, keep a level
     comparable with that of `isotropic`; the root mean square of a position is 1.8 times as large.
 
-    The body covariance is R^t S R with S fixed in the world and R the rotation that was seen. That is exact: a turn
-    leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is seen.
+    The body covariance is R^t S R with S fixed in the world and R the rotation that was observed. That is exact: a turn
+    leaves its own axis where it is, so the turn can be drawn first and the position then in the frame that is observed.
     """
 
     noise_level: NoiseLevel
@@ -43,7 +43,7 @@ class AnisotropicNoise:
     FACTS: ClassVar[Facts] = Facts(
         title="worse along one line of sight, the same for all parts",
         formula=(
-            "T_seen = T exp(xi), xi = (R_seen^t S1 e, R^t S2 e')",
+            "T_obs = T exp(xi), xi = (R_obs^t S1 e, R^t S2 e')",
             f"S1 = L ({ACROSS_SIGHT:g} (I - s s^t) + {ALONG_SIGHT:g} s s^t)",
             f"S2 = L ({OUT_OF_IMAGE:.3g} (I - s s^t) + {IN_IMAGE:g} s s^t)",
         ),
@@ -53,11 +53,11 @@ class AnisotropicNoise:
             f"{ALONG_SIGHT:g} and {ACROSS_SIGHT:g}: position over the level, along s and across it",
             f"{OUT_OF_IMAGE:.3g} and {IN_IMAGE:g}: turn over the level, about axes across s and about s",
         ),
-        states="R^t S S R with R as seen, which is exact",
+        states="R^t S S R with the observed R, exact",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the frame that is seen, R_seen^t S1 e.
+        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the observed frame, R_obs^t S1 e.
         sight = line_of_sight()
         unit = rng.standard_normal((len(assembly), 6))
         place = self.noise_level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
@@ -89,9 +89,9 @@ class CameraNoise:
     about: float = IN_IMAGE
 
     FACTS: ClassVar[Facts] = Facts(
-        title="a camera with a place: errors along, across and about the ray to each part",
+        title="a camera at a place: errors along, across and about the ray to each part",
         formula=(
-            "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
+            "T_obs = T exp(xi), xi = (R_obs^t F d, R^t F w)",
             f"d = L ({ACROSS_SIGHT:g} e1, {ACROSS_SIGHT:g} e2, {ALONG_SIGHT:g} e3), w = L ({OUT_OF_IMAGE:.3g} e4, "
             f"{OUT_OF_IMAGE:.3g} e5, {IN_IMAGE:g} e6)",
         ),
@@ -105,8 +105,8 @@ class CameraNoise:
             f"tilt = {OUT_OF_IMAGE:.3g}, about = {IN_IMAGE:g}: of the turn over the level, per axis out of the image, "
             "and in it",
         ),
-        states="the covariance in the frame of the ray on which the part is seen, turned into the part; it differs "
-        "from the one drawn by the angle between the two rays, a thousandth at 1 mm",
+        states="the covariance in the frame of the observed ray, turned into the part; the angle between that and "
+        "the true ray is a thousandth at 1 mm",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:

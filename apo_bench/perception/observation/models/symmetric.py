@@ -43,11 +43,11 @@ class SymmetricNoise:
     FACTS: ClassVar[Facts] = Facts(
         title="turns about axes of symmetry are less certain; of equal poses the nearest is reported",
         formula=(
-            "T_seen = T C exp(xi) C^-1 g, C the shift to the centre of volume",
+            "T_obs = T C exp(xi) C^-1 g, C the shift to the centre of volume",
             f"xi = L (e1, e2, e3, s1 e4, s2 e5, s3 e6), s_i = {WORSE:g} about axes of fourfold symmetry, else 1",
-            "g the one of the part's symmetries with which T_seen is turned the least",
+            "g the one of the part's symmetries with which T_obs is turned the least",
         ),
-        frame="of the part that is seen, about its centre of volume",
+        frame="of the observed part, about its centre of volume",
         parameters=(
             f"s = {WORSE:g}: factor on turns about axes with {_MANY:g} or more equal places in a whole turn",
             "symmetries: proper rotations, computed from the boxes of each part (stick 8, castle 2, block 24)",
@@ -56,11 +56,9 @@ class SymmetricNoise:
         "with m equal places counts as 180 / m / sqrt(3) deg at most; exact while errors are small against 180 / m deg "
         "(up to level 4), above an upper bound",
         notes=(
-            "a part of revolution is the same after any turn about its axis: that turn is reported, and stated, as if "
-            "its edges told it",
+            "a part of revolution is the same after any turn about its axis; it is reported with the usual error",
             "`apo_bench.perception.observation.models.symmetric:AnyTurnNoise` reports any of the equal poses instead, "
-            "each as likely, also at level 0: an estimator that knows nothing of faces. The same space is filled, but "
-            "a contact that names a face is then asked of another side",
+            "each as likely, also at level 0; a contact that names a face then concerns another side",
         ),
     )
 

@@ -1,6 +1,6 @@
 """The distribution of errors across a ray and along it: independent Student t, within a limit.
 
-Across there are two directions alike, along there is one. The same form serves for shifts [mm] and for turns [deg]
+Across there are two equal directions, along there is one. The same form serves for shifts [mm] and for turns [deg]
 (about axes across the ray, and about the ray). All integrals over the limited region are taken along the ray, by Gauss
 and Legendre in y with x = s sinh(y), which is dense where the density is high, however long its tail; across, they have
 a closed form.

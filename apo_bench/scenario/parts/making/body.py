@@ -65,7 +65,7 @@ class Body:
         radius_mm: float,
         hole: bool = True,
     ) -> "Body":
-        """With the circle at the end of a hole, or of a shaft, as a face of its own.
+        """With the circle at the end of a hole, or of a shaft, as a separate face.
 
         Args:
             at_mm: Its middle.
@@ -86,7 +86,7 @@ class Body:
 
 
 def join(*bodies: Body) -> Body:
-    """Bodies that touch and do not overlap, as one: faces end where others lie on them, and go on beside them."""
+    """Bodies that touch and do not overlap, as one: faces end where others lie on them, and go on around them."""
     flats = [face for body in bodies for face in body.flats]
     rounds = [face for body in bodies for face in body.rounds]
     return Body(

@@ -90,7 +90,7 @@ def extrude(
 
     Args:
         holes: Outlines, counter-clockwise too, that go all the way through.
-        bores: Round holes, cut into wedges that are tangent to them; what has no room for wedges of its own, and is a
+        bores: Round holes, cut into wedges that are tangent to them; what has no room for its own wedges, and is a
             cylinder all the way through, becomes a hole like others.
         bottom: Name of the lower face; else one is found.
         fit: Which of the two end faces, by name, recede by the clearance.
