@@ -30,7 +30,6 @@ from apo_bench.planning.prediction.measures import (
     Measure,
     drawn_measures,
     measures,
-    standing_measures,
 )
 from apo_bench.records import NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
@@ -146,11 +145,11 @@ def plan_score(
     fits = dict[tuple[str, ...], float]()
     score = 0.0
     for each in explained:
-        assembly = _without(plan.assembly, each.dropped)
+        kept = replace(plan, assembly=_without(plan.assembly, each.dropped)) if each.dropped else plan
         if each.dropped not in fits:
-            fits[each.dropped] = _fit_share(replace(plan, assembly=assembly), where, arm, ends)
+            fits[each.dropped] = _fit_share(kept, where, arm, ends)
         truths = draw_truths(each, max(1, round(TRUTHS * each.weight)), rng)
-        score += each.weight * fits[each.dropped] * _cover_share(replace(plan, assembly=assembly), truths, where)
+        score += each.weight * fits[each.dropped] * _cover_share(kept, truths, where)
     return score
 
 
@@ -217,8 +216,6 @@ def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Arr
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     """The assembly without dropped contacts."""
-    if not dropped:
-        return assembly
     left = {
         (relation.made, relation.contact)
         for relation, kept in zip(assembly.relations(), assembly.without(dropped), strict=True)
@@ -241,8 +238,8 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     lengths = where.clearance_mm, scenario.thresholds
-    every = standing_measures(plan, *lengths) if ends else measures(plan, *lengths, scenario.attach, arm=arm)
-    stands = np.prod([_within(each, less_mm) for each in every])
+    planned = measures(plan, *lengths, scenario.attach, arm=arm)
+    stands = np.prod([_within(each, less_mm) for each in planned if each.kind in _WEIGHED or not ends])
     if not ends:
         return float(stands)
     drawn = drawn_measures(plan, *lengths, scenario.attach, arm, ends)

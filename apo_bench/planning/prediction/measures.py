@@ -32,7 +32,7 @@ from apo_bench.assembly import (
     compute_placements,
     list_alternatives,
 )
-from apo_bench.geometry import Array, Mate
+from apo_bench.geometry import Array, Mate, remember
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.interference import Solids, depths_from_above, depths_on_way, physical_solids
 from apo_bench.planning.prediction.resting import enters, is_support, residual, residuals, resting_poses
@@ -174,21 +174,35 @@ def measures(
         room_mm: Centres of mass are looked at this far aside, too.
         arm: As in `predict`; its reach is not measured.
     """
+    falls, of_acts = _as_planned(plan, clearance_mm, thresholds, tuple(attach), room_mm)
+    yield from falls
+    for act, found in of_acts:
+        yield from found
+        fit = DrawnMeasure(act.number, "fit", np.array([found[0].size]), np.array([found[0].allowed]))
+        yield from (each.one() for each in _by_arm(act, arm, attach, clearance_mm, thresholds, fit))
+
+
+@remember
+def _as_planned(
+    plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: tuple[Attach, ...], room_mm: float
+) -> tuple[tuple[Measure, ...], tuple[tuple[_Act, tuple[Measure, ...]], ...]]:
+    """What falls, and what each operation is measured by without an arm, the fit first; a trial asks for it thrice."""
     acts = tuple(_acts(plan))
-    yield from (_falls(act, room_mm) for act in acts)
     physical = physical_solids(plan.assembly, clearance_mm)
+    falls = [
+        Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
+        for act in acts
+    ]
+    of_acts = []
     for act in acts:
-        for each in _drawn(act, clearance_mm, thresholds, attach, arm, physical):
-            yield each.one()
-            if each.kind == "side":
-                yield from _leans(plan, act, clearance_mm, thresholds, room_mm)
-
-
-def standing_measures(plan: Plan, clearance_mm: float, thresholds: Thresholds) -> Iterator[Measure]:
-    """Those of `measures` that say whether a part would fall or lean."""
-    for act in _acts(plan):
-        yield _falls(act, 0.0)
-        yield from _leans(plan, act, clearance_mm, thresholds, 0.0)
+        fit, side, *depths = (each.one() for each in _drawn(act, clearance_mm, thresholds, attach, physical))
+        leans = list[Measure]()
+        stays = not any(act.operation.main in later.moves for later in plan.assembly.operations[act.number + 1 :])
+        if stays and clearance_mm > thresholds.fit_margin_mm:
+            size = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
+            leans = [Measure(act.number, "leans", size, BALANCED)]
+        of_acts.append((act, (fit, side, *leans, *depths)))
+    return tuple(falls), tuple(of_acts)
 
 
 def drawn_measures(
@@ -199,7 +213,7 @@ def drawn_measures(
     arm: Sequence[ArmMove],
     brought: Sequence[Poses],
 ) -> Iterator[DrawnMeasure]:
-    """What plans are measured by that robots with errors carry out, but for `standing_measures`.
+    """What a plan is measured by that robots with errors carry out, but for what falls or leans.
 
     Args:
         arm: As in `predict`; its reach is not measured.
@@ -207,30 +221,14 @@ def drawn_measures(
     """
     physical = physical_solids(plan.assembly, clearance_mm)
     for act in _acts(plan, brought):
-        yield from _drawn(act, clearance_mm, thresholds, attach, arm, physical)
-
-
-def _falls(act: _Act, room_mm: float) -> Measure:
-    return Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
-
-
-def _leans(plan: Plan, act: _Act, clearance_mm: float, thresholds: Thresholds, room_mm: float) -> Iterator[Measure]:
-    """Of a part that stays where it is put, if clearances leave room to lean."""
-    stays = not any(act.operation.main in later.moves for later in plan.assembly.operations[act.number + 1 :])
-    if stays and clearance_mm > thresholds.fit_margin_mm:
-        leans = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
-        yield Measure(act.number, "leans", leans, BALANCED)
+        fit, *others = _drawn(act, clearance_mm, thresholds, attach, physical)
+        yield from (fit, *others, *_by_arm(act, arm, attach, clearance_mm, thresholds, fit))
 
 
 def _drawn(
-    act: _Act,
-    clearance_mm: float,
-    thresholds: Thresholds,
-    attach: Sequence[Attach],
-    arm: Sequence[ArmMove],
-    physical: Solids,
+    act: _Act, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach], physical: Solids
 ) -> Iterator[DrawnMeasure]:
-    """What an operation is measured by, but for what falls or leans."""
+    """What an operation is measured by without an arm, but for what falls or leans; the fit is the first."""
     k = act.number
     how = attach[k] if attach else None
     fit = _fit(act, how, clearance_mm, thresholds)
@@ -242,8 +240,26 @@ def _drawn(
         yield DrawnMeasure(k, "on_way", 1e3 * depths_m, deep_mm * same)
     for depths_m in depths_from_above(act.operation, act.planned, how, physical):
         yield DrawnMeasure(k, "from_above", 1e3 * depths_m, _BESIDE_MM * same)
-    for move in (move for move in arm if move.operation == k and not move.undo):
-        yield DrawnMeasure(k, "gripper", move.struck_mm * same, thresholds.displaced_mm * same, move.struck)
+
+
+def _by_arm(
+    act: _Act,
+    arm: Sequence[ArmMove],
+    attach: Sequence[Attach],
+    clearance_mm: float,
+    thresholds: Thresholds,
+    fit: DrawnMeasure,
+) -> Iterator[DrawnMeasure]:
+    """What an operation is measured by once it is known what an arm makes of it.
+
+    Args:
+        fit: How well it fits without the arm.
+    """
+    same = np.ones_like(fit.size)
+    how = attach[act.number] if attach else None
+    for move in (move for move in arm if move.operation == act.number and not move.undo):
+        allowed = thresholds.displaced_mm * same
+        yield DrawnMeasure(act.number, "gripper", move.struck_mm * same, allowed, move.struck)
         yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 
 
