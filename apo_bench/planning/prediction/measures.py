@@ -138,6 +138,8 @@ class _Act(NamedTuple):
     """Every part where the plan has it after the operation, or where each of several robots brings it."""
     rests: Poses
     """Every part where it will have come to rest."""
+    known: Meetings
+    """The contacts of all operations, with what is measured already."""
 
     @property
     def operation(self) -> Operation:
@@ -187,10 +189,10 @@ def _as_planned(
     plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: tuple[Attach, ...], room_mm: float
 ) -> tuple[tuple[Measure, ...], tuple[tuple[_Act, tuple[Measure, ...]], ...]]:
     """What falls, and what each operation is measured by without an arm, the fit first; a trial asks for it thrice."""
-    acts = tuple(_acts(plan))
+    acts = _acts(plan)
     physical = physical_solids(plan.assembly, clearance_mm)
     falls = [
-        Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
+        Measure(act.number, "falls", imbalance(act.known, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
         for act in acts
     ]
     of_acts = []
@@ -199,7 +201,7 @@ def _as_planned(
         leans = list[Measure]()
         stays = not any(act.operation.main in later.moves for later in plan.assembly.operations[act.number + 1 :])
         if stays and clearance_mm > thresholds.fit_margin_mm:
-            size = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
+            size = imbalance(act.known, act.operation, act.planned, 1e-3 * room_mm, ceilings=False)
             leans = [Measure(act.number, "leans", size, BALANCED)]
         of_acts.append((act, (fit, side, *leans, *depths)))
     return tuple(falls), tuple(of_acts)
@@ -263,8 +265,13 @@ def _by_arm(
         yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 
 
-def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> Iterator[_Act]:
-    """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along."""
+def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> tuple[_Act, ...]:
+    """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along.
+
+    All contacts are measured in one call.
+    """
+    acts = list[_Act]()
+    known = Meetings(plan.assembly)
     given_poses = iter(brought)
     planned = rests = plan.start
     origins = dict[int, tuple[Array, Array]]()
@@ -278,7 +285,10 @@ def _acts(plan: Plan, brought: Sequence[Poses] = ()) -> Iterator[_Act]:
         given = next(given_poses, None)
         planned, rests = [given] * 2 if given else (_put(alone, poses, target) for poses in (planned, rests))
         rests = resting_poses(alone, operation, rests)
-        yield _Act(k, alone, planned, rests)
+        acts.append(_Act(k, alone, planned, rests, known))
+    places = [(act.operation.contacts, poses) for act in acts for poses in (act.planned, act.rests)]
+    known.measure((c, poses) for contacts, at in places for poses in list_alternatives(at) for c in contacts)
+    return tuple(acts)
 
 
 def _put(alone: Assembly, before: Poses, goal: Array) -> Poses:
@@ -291,12 +301,11 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
     lengths = clearance_mm, thresholds.fit_margin_mm, thresholds.support_mm
     entering = [contact for contact in act.operation.contacts if enters(act.alone, contact)]
     limits = [compute_deep_limit_mm(act.alone, contact, *lengths) for contact in entering]
-    known = Meetings(act.alone)
     alternatives = list_alternatives(act.planned)
-    known.measure((contact, poses) for poses in alternatives for contact in entering)
+    act.known.measure((contact, poses) for poses in alternatives for contact in entering)
     worst = []
     for poses in alternatives:
-        off = [_misfit_mm(act, contact, known, poses, how) for contact in entering]
+        off = [_misfit_mm(act, contact, poses, how) for contact in entering]
         sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
         sides += [(deep, limit) for (deep, _), limit in zip(off, limits, strict=True)]
         most = max(sides, key=_excess)
@@ -330,12 +339,12 @@ def _tip(
     yield DrawnMeasure(act.number, "tip", off.size + move.beside_mm, off.allowed)
 
 
-def _misfit_mm(act: _Act, contact: Contact, known: Meetings, poses: Poses, how: Attach | None) -> tuple[float, float]:
+def _misfit_mm(act: _Act, contact: Contact, poses: Poses, how: Attach | None) -> tuple[float, float]:
     """How deep and how far apart a contact is across the way in at most, [mm]; of round faces, twice, how far apart the
     axes are, across it.
     """
     way = None if how is None else poses[act.operation.main][:3, :3] @ how.direction
-    (lie,) = known.measure([(contact, poses)])
+    (lie,) = act.known.measure([(contact, poses)])
     if classify_contact(*map(act.alone.face_of, contact)) in ("plane on plane", "shaft on plane"):
         e, n = residual(act.alone, contact, lie, poses)
         if way is not None and abs(n @ way) >= _ACROSS:
@@ -358,7 +367,7 @@ def _off_axis_m(lie: Mate, way: Array | None) -> float:
 def _side_mm(act: _Act) -> Array:
     """Largest |e| of the sides that the operation slides onto others, once its part rests, of each draw, (r,)."""
     touched = [contact for contact in act.operation.contacts if not enters(act.alone, contact)]
-    found = residuals(act.alone, touched, act.rests)
+    found = residuals(act.known, touched, act.rests)
     worst = np.zeros(len(found))
     for i, contact in enumerate(touched):
         most = np.array([1e3 * np.abs(each[i][0]).max() for each in found])

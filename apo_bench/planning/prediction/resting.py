@@ -45,7 +45,7 @@ def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Pos
     for contact in supports * (_ROUNDS if any(map(assembly.is_round, supports)) else 1):
         _displace(now, operation, _flat(assembly, contact, now))
     for contact in (contact for contact in touched if contact not in supports):
-        first = [n * e.min() for ((e, n),) in residuals(assembly, [contact], now)]
+        first = [n * e.min() for ((e, n),) in residuals(Meetings(assembly), [contact], now)]
         _displace(now, operation, _shift(np.array(first).reshape(*_lead(now, operation), 3)))
     return MappingProxyType(now)
 
@@ -56,21 +56,22 @@ def enters(assembly: Assembly, contact: Contact) -> bool:
     return assembly.is_fit(contact) or not on_plane
 
 
-def residuals(assembly: Assembly, contacts: Sequence[Contact], poses: Poses) -> list[tuple[tuple[Array, Array], ...]]:
+def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> list[tuple[tuple[Array, Array], ...]]:
     """e of each contact at the corners of its overlap, (k,), [m], positive where the faces are apart, and the normal.
 
     Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
     shaft on a plane the ends of the line of contact. The normal, (3,), is that of the flat face, world.
 
     Args:
+        known: The contacts, with what is measured already.
         poses: World frame, [m]; there may be several alternatives, (r, 4, 4).
 
     Returns:
         For each alternative those of the contacts.
     """
     alternatives = list_alternatives(poses)
-    lies = iter(Meetings(assembly).measure((contact, each) for each in alternatives for contact in contacts))
-    return [tuple(residual(assembly, contact, next(lies), each) for contact in contacts) for each in alternatives]
+    lies = iter(known.measure((contact, each) for each in alternatives for contact in contacts))
+    return [tuple(residual(known.assembly, contact, next(lies), each) for contact in contacts) for each in alternatives]
 
 
 def residual(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> tuple[Array, Array]:
