@@ -1,5 +1,6 @@
 """Measure the contacts of an assembly on the nominal faces at the poses that were reached."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
@@ -172,13 +173,13 @@ def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Meeting) -
     """
     if isinstance(lie, Mate):
         off = 1e3 * lie.gap_m
-        return Gaps(off, off) if lie.common else None, float(np.degrees(lie.angle_rad))
+        return Gaps(off, off) if lie.common else None, math.degrees(lie.angle_rad)
     plane = assembly.face(contact.manipulated).plane
     normal = assembly.face(contact.environment).normal
     T_m = poses[contact.manipulated.part]
     T_e = poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
-    angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
+    angle = math.degrees(math.acos(min(1.0, max(-1.0, float(-n @ T_e[:3, :3] @ normal)))))
     if not lie:
         return None, angle
     # Seen from the manipulated face, a corner on the plane of the other one is in front of it where the two are apart.

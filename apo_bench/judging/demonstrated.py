@@ -7,12 +7,12 @@ import numpy as np
 from apo_bench.assembly import Assembly, ReachedState, Snapshot, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import ContactCase, ContactJudge, ContactMoment, ContactVerdict
-from apo_bench.judging.displaced import displacements
-from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
 
 
-def judge_demonstrated(judge: ContactJudge, reached: ReachedState, reference: Array) -> Judgement:
+def judge_demonstrated(
+    judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
+) -> Judgement:
     """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
 
     At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
@@ -24,6 +24,7 @@ def judge_demonstrated(judge: ContactJudge, reached: ReachedState, reference: Ar
     Args:
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
+        displaced: From `displacements`, [m].
     """
     assembly = judge.known.assembly
     after = reached.after
@@ -32,7 +33,7 @@ def judge_demonstrated(judge: ContactJudge, reached: ReachedState, reference: Ar
     return judgement(
         _contacts_when_made(judge, after, final, reference),
         states,
-        [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *_corners_at_end(assembly, reached))],
+        [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *displaced.items())],
         judge.thresholds,
         all_made=len(states) == len(after) + 1,
     )
@@ -73,9 +74,3 @@ def _pushes(
             at = {part: pose.apply(snapshot.poses[part], c)[0] for part, c in centroids.items()}
             yield from ((part, float(np.linalg.norm(at[part] - where))) for part, where in put.items())
             put.update({part: at[part] for part in moved})
-
-
-def _corners_at_end(assembly: Assembly, reached: ReachedState) -> Iterator[tuple[str, float]]:
-    """How far a corner of each part that is no fixture lies at most from where its last operation had put it, [m]."""
-    if reached.final is not None:
-        yield from displacements(assembly, reached.after, reached.final, fixtures(assembly))

@@ -1,6 +1,6 @@
 """Judge the finished assembly: what a person says who sees the end, whatever became of it on the way."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -14,13 +14,15 @@ from apo_bench.assembly import (
     compute_placements,
     list_alternatives,
 )
-from apo_bench.geometry import Array, find_nearest_alike
+from apo_bench.geometry import Array, find_nearest_alike, remember
 from apo_bench.judging.contacts import ContactCase, ContactJudge, compute_covered_shares
-from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
+from apo_bench.judging.displaced import faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 
 
-def judge_finished(judge: ContactJudge, reached: ReachedState, reference: Array) -> Judgement:
+def judge_finished(
+    judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
+) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
     The contacts that stand at the end are needed. A part may have been put in by any of its symmetries: the one
@@ -33,6 +35,7 @@ def judge_finished(judge: ContactJudge, reached: ReachedState, reference: Array)
     Args:
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
+        displaced: From `displacements`, [m].
     """
     assembly = judge.known.assembly
     final = reached.final
@@ -43,17 +46,18 @@ def judge_finished(judge: ContactJudge, reached: ReachedState, reference: Array)
     limits = judge.thresholds
     true = compute_placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
-    moved = faults_of_place(judge.known, reached.after, final, away, seen, limits.displaced_mm)
+    moved = faults_of_place(judge.known, reached.after, final, displaced, away, seen, limits.displaced_mm)
     return judgement(
         judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],
         [(what, 1e3 * m) for what, m in moved],
         limits,
         all_made=all_made,
-        disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
+        disturbed=[1e3 * m for m in displaced.values()],
     )
 
 
+@remember
 def fixtures(assembly: Assembly) -> frozenset[str]:
     """The parts that were used and put away.
 
