@@ -22,7 +22,7 @@ MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test style types contracts site compiled test-extras numeric docs lowest clean
+.PHONY: sweep headline test style types contracts site test-extras numeric docs lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep benchmarks/demo.toml --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
@@ -38,7 +38,7 @@ test numeric: export PYTHONDONTWRITEBYTECODE :=
 # what needs one core runs beside what needs the other; three processes for two cores, as some tests wait for a process
 # or a limit; how long each test took is kept in build/durations.xml
 test: $(VENV)/.installed-dev
-	$(MAKE) --jobs 2 types site compiled style contracts
+	$(MAKE) --jobs 2 types site style contracts
 	$(BIN)/pytest -q -n 3 --dist worksteal -m "not extras" --durations=10 --junitxml=build/durations.xml
 	$(NUMERIC)
 
@@ -55,15 +55,11 @@ style: $(VENV)/.installed-dev
 contracts: $(VENV)/.installed-dev
 	$(BIN)/lint-imports --no-logo --no-cache
 
-# Numba keeps what it compiles, so that three processes of tests do not compile it three times
-compiled: $(VENV)/.installed-dev
-	@$(BIN)/apo-bench correct stick_in_tower --observation docs/seen.csv --method contact > /dev/null
-
 # the tests that start a Ray cluster or read STEP files
 test-extras: $(VENV)/.installed-dev
 	$(BIN)/pytest -q -m extras $$(grep -rl pytest.mark.extras tests --include=test_*.py)
 
-# the tests marked numeric, under every other kernel of OpenBLAS, NumPy and Numba that the processor allows
+# the tests marked numeric, under every other kernel of OpenBLAS and NumPy that the processor allows
 numeric: $(VENV)/.installed-dev
 	$(NUMERIC)
 

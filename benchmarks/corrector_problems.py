@@ -52,7 +52,7 @@ def observe(of: Problem, seed: int, mm: float = 2.0, deg: float = 1.0) -> Observ
 def figure(name: str) -> Problem:
     """Return an example of the paper."""
     scenario = load_scenario(FIGURES[name])
-    assembly, poses = scenario.assembly, np.array(scenario.goals)
+    assembly, poses = scenario.assembly, np.array(scenario.nominal_poses)
     if name == "fig6":
         assembly = replace(assembly, operations=tuple(assembly.operations[k] for k in KEPT_OF_FIG6))
         poses = poses[KEPT_OF_FIG6]

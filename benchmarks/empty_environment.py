@@ -1,8 +1,8 @@
 """Check a built package in an empty virtual environment: `python benchmarks/empty_environment.py dist/*.whl`.
 
 pip installs the package with the Python that runs this. In an empty folder the script imports every module, runs a
-trial, makes an environment, corrects measured poses, and runs a small sweep with its report. `--tests` runs the core of
-the tests there. The script prints the number of installed packages and the large ones.
+trial, makes an environment, corrects measured poses, runs a small sweep with its report, and the Python of README.
+`--tests` runs the core of the tests there. The script prints the number of installed packages and the large ones.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -28,7 +29,7 @@ LARGE_MB = 50
 TIMES = 5  # runs of the import, of which the fastest counts
 INSTALLERS = ("pip", "setuptools")  # part of every environment
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
-OPTIONAL = ("build123d", "dm_env", "numba", "OCP", "pyarrow", "ray", "viser")
+OPTIONAL = ("build123d", "dm_env", "OCP", "pyarrow", "ray", "viser")
 """Packages of the extras; a module that needs one of these may be missing."""
 IMPORT = f"""
 import importlib, pkgutil, sys, apo_bench
@@ -96,7 +97,7 @@ class EmptyEnvironment:
     def run(self, program: str, *arguments: str) -> str:
         """What a program of the environment prints; ends this one if it fails."""
         alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        place = self.folder / "env" / "bin" / program
+        place = self.folder / "env" / ("Scripts" if sys.platform == "win32" else "bin") / program
         done = subprocess.run([place, *arguments], cwd=self.here, env=alone, stdout=subprocess.PIPE, text=True)
         if done.returncode != 0:
             sys.exit(f"{program} {' '.join(arguments)[:200]} ended with {done.returncode}. {done.stdout[-2000:]}")
@@ -139,7 +140,13 @@ def check(made: EmptyEnvironment) -> str:
     made.run("apo-bench", *CORRECT)
     made.run("apo-bench", *SWEEP)
     made.run("apo-bench", "report", "run")
-    return f"{modules} modules, a trial, an environment, a correction, a sweep and its report work"
+    made.run("python", "-c", "\n".join(readme_programs()))
+    return f"{modules} modules, a trial, an environment, a correction, a sweep and its report, and README work"
+
+
+def readme_programs() -> list[str]:
+    """Return the blocks of Python in README, which continue each other."""
+    return re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(encoding="utf-8"), re.M | re.S)
 
 
 def check_by_tests(made: EmptyEnvironment, bounds: Sequence[str], packages: Sequence[str]) -> str:

@@ -130,7 +130,7 @@ def draw(paths: Sequence[Path]) -> None:
     for path in paths:
         scene = build_scene(load_scenario(path))
         scenario = scene.scenario
-        poses = compute_placements(scenario.assembly, scenario.start, scenario.goals)[-1]
+        poses = compute_placements(scenario.assembly, scenario.start, scenario.nominal_poses)[-1]
         middle = np.mean([poses[part][:3, 3] for part in scenario.assembly.fixed if part != TABLE], axis=0)
         view = aim_camera(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
         views.append(draw_picture(scene, poses, 300, 260, view))

@@ -52,7 +52,7 @@ SAME = 1e-9
 """What two checkouts may differ by on one machine: [mm], [rad], or a part of numbers above 1."""
 CLOSE = 2e-5
 """What stable corrections may differ by on another processor, in the same units. Solvers stop when a step is small, so
-that rounding decides about the last one: under other kernels of OpenBLAS, NumPy and Numba 5e-6 was the largest."""
+that rounding decides about the last one: under other kernels of OpenBLAS and NumPy 5e-6 was the largest."""
 STABLE = 1e-4
 """By what the perturbation, 1e-6 mm, may move a stable correction."""
 VERDICT = ("success", "as_demonstrated", "loose_success", "failure_stage", "failure_code", "error")

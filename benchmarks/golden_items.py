@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 SETTINGS: dict[str, str] = {}
 """Settings of trials, arguments of environments and columns of records: neutral name -> name today."""
-VALUES: dict[str, str] = {}
+VALUES = {"shifted:3": "face-offset:3mm", "shifted:5": "face-offset:5mm", "promise": "predicted-success"}
 """Values of settings, and correctors."""
 EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
@@ -30,7 +30,7 @@ KEYS = {
     "contacts_false": "contacts_false_positive",
     "free_moved": "fit_adjustments",
     "moved_in_hand": "grasp_slip",
-    "pushed_mm": "displaced_mm",
+    "pushed_mm": "placed_part_shift_mm",
     "sim_seconds": "sim_time_s",
     "chi_square_freedom": "chi_square_dof",
     "freed": "corrected_operations",
@@ -204,4 +204,10 @@ def neutral(name: str) -> str:
     return _NEUTRAL.get(name, name)
 
 
+def neutral_value(text: str) -> str:
+    """The neutral form of a word in a result."""
+    return _NEUTRAL_VALUES.get(text, text)
+
+
+_NEUTRAL_VALUES = {now: name for name, now in VALUES.items()}
 _NEUTRAL = {now: name for name, now in (KEYS | SETTINGS).items() if name != "human_covariance"}

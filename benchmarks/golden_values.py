@@ -25,6 +25,7 @@ from benchmarks.golden_items import (
     VALUES,
     Item,
     neutral,
+    neutral_value,
     today,
 )
 
@@ -68,7 +69,7 @@ def in_mm(values: np.ndarray) -> np.ndarray:
 def rounded(value: Any) -> Any:
     """A number with 12 digits, none of them beyond the 12th decimal; words, truth values and None as they are."""
     if value is None or isinstance(value, str | bool):
-        return value
+        return neutral_value(value) if isinstance(value, str) else value
     if isinstance(value, np.bool_):
         return bool(value)
     return float(f"{round(float(value), 12):.12g}") + 0.0

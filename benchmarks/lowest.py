@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.empty_environment import CORE, ROOT, check, check_by_tests, empty_environment
 
-EXTRAS = ("fast", "dm", "data", "film", "range")
+EXTRAS = ("dm", "data", "film", "range")
 """Of the optional dependencies these are tried too."""
 BOUND = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^]]*\])?>=([0-9][0-9.]*)(?:,<[0-9.]+)?(?:; .*)?")
 OLDEST = (3, 11)

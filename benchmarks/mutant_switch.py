@@ -143,9 +143,9 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     reached = tests_of(LOG.read_text().splitlines())
     by_id = {item.nodeid: item for item in session.items}
     with (HERE / "outcomes.jsonl").open("w") as file:
-        for number, package, as_text in json.loads((HERE / "mutants.json").read_text()):
+        for number, package in json.loads((HERE / "mutants.json").read_text()):
             tests = {test for test in reached[str(number)] if test in seconds}
-            early = as_text or "import" in reached[str(number)]
+            early = "import" in reached[str(number)]
             if early:
                 tests |= {test for test in seconds if test.startswith(f"tests/{package}/")}
             chosen = quickest(tests, seconds, package)

@@ -5,7 +5,7 @@
 All mutants stand in one copy of the checkout, each behind a switch (`mutant_switch.py`). The tests of all packages
 but `extras` run once without any mutant, which shows what each test reaches and how long it takes. With a mutant on,
 only the tests that reach it run, quickest first, up to 30 s or the first failure. A mutant that runs while tests are
-imported gets its own process, and so does compiled code. Mutants that no test notices are printed. `--only` takes
+imported gets its own process. Mutants that no test notices are printed. `--only` takes
 mutants and tests of some packages, `--root` another checkout, which stays as it is.
 """
 
@@ -97,19 +97,18 @@ def outcomes(root: Path, mutants: Sequence[Mutant], packages: Sequence[str], wor
     """What the tests of some packages say of each mutant, in a copy that has them all, in `work`."""
     place = work / "copy"
     copy(root, place)
-    as_text = {mutant.file for mutant in mutants if b"njit" in (root / "apo_bench" / mutant.file).read_bytes()}
     for path in [*(place / "apo_bench").rglob("*.py"), *(place / "tests").rglob("*.py")]:
         file = path.relative_to(place / "apo_bench").as_posix() if path.is_relative_to(place / "apo_bench") else ""
         numbers = {
             (mutant.begin, mutant.before): (number, mutant.after)
             for number, mutant in enumerate(mutants, start=1)
-            if mutant.file == file and file not in as_text
+            if mutant.file == file
         }
         if numbers or b"cache" in path.read_bytes():
             path.write_text(switched(path.read_bytes(), numbers), encoding="utf-8")
     switch = (ROOT / "benchmarks" / "mutant_switch.py").read_bytes()
     (place / "mutant_switch.py").write_bytes(switch)
-    known = [(number, mutant.package, mutant.file in as_text) for number, mutant in enumerate(mutants, start=1)]
+    known = [(number, mutant.package) for number, mutant in enumerate(mutants, start=1)]
     (place / "mutants.json").write_text(json.dumps(known))
     pytest(place, [f"tests/{package}" for package in packages], {"MUTANT_NOTES": "1"}, None)
     ran = []
@@ -119,7 +118,7 @@ def outcomes(root: Path, mutants: Sequence[Mutant], packages: Sequence[str], wor
         if not outcome["tests"]:
             how = Ran(True, "no test reaches it", 0.0)
         elif outcome["early"]:
-            how = imported(place, mutant, outcome, mutant.file in as_text)
+            how = imported(place, outcome)
         else:
             how = Ran(outcome["passed"], outcome["by"] or f"{len(outcome['tests'])} tests pass", outcome["seconds"])
         if how.passed:
@@ -130,20 +129,11 @@ def outcomes(root: Path, mutants: Sequence[Mutant], packages: Sequence[str], wor
     return ran
 
 
-def imported(place: Path, mutant: Mutant, outcome: Mapping[str, Any], as_text: bool) -> Ran:
-    """The tests of a mutant that is there while the package is imported, or, as text, while it is compiled."""
-    path = place / "apo_bench" / mutant.file
-    source = path.read_bytes()
+def imported(place: Path, outcome: Mapping[str, Any]) -> Ran:
+    """The tests of a mutant that is there while the package is imported."""
     (place / "chosen.json").write_text(json.dumps(outcome["tests"]))
     env = {"MUTANT": str(outcome["number"])}
-    if as_text:
-        end = mutant.begin + len(mutant.before.encode())
-        path.write_bytes(source[: mutant.begin] + mutant.after.encode() + source[end:])
-        env["NUMBA_CACHE_DIR"] = str(place.parent / f"compiled_{outcome['number']}")
-    try:
-        ran = pytest(place, sorted({test.split("::")[0] for test in outcome["tests"]}), env, LONGEST_S)
-    finally:
-        path.write_bytes(source)
+    ran = pytest(place, sorted({test.split("::")[0] for test in outcome["tests"]}), env, LONGEST_S)
     return ran if ran.by else ran._replace(by=f"{len(outcome['tests'])} tests pass")
 
 
@@ -151,7 +141,7 @@ def pytest(place: Path, paths: Sequence[str], more: Mapping[str, str], longest_s
     """Tests in the copy, up to the first that fails; what hypothesis draws is the same every time."""
     options = ["-q", "-x", "-n", "0", "-m", "not extras", "--tb=no", "-rfE", "--hypothesis-seed=0"]
     options += ["-p", "mutant_switch", "-p", "no:cacheprovider", f"--basetemp={place.parent / 'pytest'}"]
-    env = os.environ | {"PYTHONPATH": str(place), "NUMBA_CACHE_DIR": str(place.parent / "compiled")}
+    env = os.environ | {"PYTHONPATH": str(place)}
     env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
     shutil.rmtree(place / ".hypothesis", ignore_errors=True)
     began = time.monotonic()

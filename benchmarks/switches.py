@@ -1,6 +1,6 @@
-"""Run a command under other kernels of OpenBLAS, NumPy and Numba: `python -m benchmarks.switches COMMAND...`.
+"""Run a command under other kernels of OpenBLAS and NumPy: `python -m benchmarks.switches COMMAND...`.
 
-All three choose their code by the processor, so results differ between processors in their last bits. A switch counts
+Both choose their code by the processor, so results differ between processors in their last bits. A switch counts
 only where a process under it confirms it; one that the processor does not allow is printed and left out. The variable
 APO_BENCH_KERNELS names the expected kernels for the command. Without a command: the kernels in use here, as JSON.
 """
@@ -35,8 +35,6 @@ class Kernels:
     """The kernels of every OpenBLAS that is loaded, NumPy's and SciPy's; none where neither uses one."""
     numpy: tuple[str, ...]
     """Features above the least that NumPy was built for."""
-    numba: tuple[str, ...]
-    """The processor that Numba compiles for and its features, as LLVM names them; empty without Numba."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +56,7 @@ def in_use() -> Kernels:
         assert np.allclose(solved, np.eye(40))
     blas = tuple(sorted(str(one["architecture"]) for one in threadpool_info() if one["internal_api"] == "openblas"))
     features = compiled.__cpu_features__
-    return Kernels(blas, tuple(name for name in compiled.__cpu_dispatch__ if features[name]), _compiled_for())
-
-
-def _compiled_for() -> tuple[str, ...]:
-    try:
-        from numba.core.registry import cpu_target
-    except ImportError:
-        return ()
-    _, processor, features = cpu_target.target_context.codegen().magic_tuple()
-    return (processor, *sorted(name for name in features.split(",") if name.startswith("+")))
+    return Kernels(blas, tuple(name for name in compiled.__cpu_dispatch__ if features[name]))
 
 
 def under(environment: Mapping[str, str]) -> Kernels | str:
@@ -88,20 +77,17 @@ def under(environment: Mapping[str, str]) -> Kernels | str:
 
 
 def switches(own: Kernels) -> Iterator[Switch | str]:
-    """Every switch that took, or a sentence on one that is not run, given the kernels without any.
-
-    The first is the one under which Numba compiles again, which takes longest.
-    """
-    plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(own.numpy), "NUMBA_CPU_NAME": "generic"}
+    """Every switch that took, or a sentence on one that is not run, given the kernels without any."""
+    plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(own.numpy)}
     found = under(plain)
     if isinstance(found, str):
         yield f"vector features off is not run: {found}"
-    elif found.numpy or found.numba[:1] not in ((), ("generic",)):
-        yield f"vector features off is not run: {found.numpy or found.numba} stay on"
-    elif (found.numpy, found.numba) == (own.numpy, own.numba):
-        yield "vector features off is not run again: NumPy and Numba use none on this processor"
+    elif found.numpy:
+        yield f"vector features off is not run: {found.numpy} stay on"
+    elif not own.numpy:
+        yield "vector features off is not run again: NumPy uses none on this processor"
     else:
-        yield Switch("vector features of NumPy and Numba off", plain, found)
+        yield Switch("vector features of NumPy off", plain, found)
     for name in BLAS:
         found = under({"OPENBLAS_CORETYPE": name}) if own.blas else "neither NumPy nor SciPy uses OpenBLAS"
         if isinstance(found, str):

@@ -51,7 +51,7 @@ SCENARIOS = (
 KINDS = {
     "false-positive": "a contact too many",
     "false-negative": "a contact missing",
-    "shifted:3": "a face 3 mm off",
+    "face-offset:3mm": "a face 3 mm off",
 }
 METHODS = ("ceiling", "contact", "contact-drop", "contact-robust")
 COLUMNS = ("draws", *METHODS, "dropped_rightly", "dropped_wrongly")

@@ -46,16 +46,16 @@ def fixed(built: Scene, *parts: str) -> Scene:
     n = len(parts)
     assembly = built.assembly
     assert {operation.main for operation in assembly.operations[:n]} == set(parts)
-    start = {**built.start, **dict(zip(parts, built.goals[:n], strict=True))}
+    start = {**built.start, **dict(zip(parts, built.nominal_poses[:n], strict=True))}
     rest = replace(assembly, operations=assembly.operations[n:], fixed=assembly.fixed | set(parts))
-    return Scene(rest, start, built.goals[n:])
+    return Scene(rest, start, built.nominal_poses[n:])
 
 
 def peg_in_fixed() -> Scene:
     """A peg of 8 mm stands in a hole of 10 mm that is fixed: 1 mm of play by their sizes."""
     built = peg_in_plate()
     solids = [table(), plate(fit=False), peg(radius=4.0)]
-    return fixed(scene(solids, built.assembly.operations, list(built.goals)), "plate")
+    return fixed(scene(solids, built.assembly.operations, list(built.nominal_poses)), "plate")
 
 
 def fixed_groove() -> Scene:

@@ -64,4 +64,4 @@ def under_roof(angle_deg: float = 30.0) -> Scene:
         [table(), slope, round_parts.wedge(angle_deg=angle_deg)], [Operation("wedge", contacts)], [mm(0, 0, 0)]
     )
     of = replace(made.assembly, fixed=frozenset({"table", "roof"}))
-    return Scene(of, {**made.start, "roof": turned}, made.goals)
+    return Scene(of, {**made.start, "roof": turned}, made.nominal_poses)

@@ -77,7 +77,7 @@ def never(*moments: int) -> Edit:
 def reached(scene: scenes.Scene, edits: Sequence[Edit]) -> list[dict]:
     """After each operation and at the end: everything as it should be but for the edits."""
     there = scenes.turned(scene, LAYOUT)
-    history = compute_placements(there.assembly, there.start, there.goals)
+    history = compute_placements(there.assembly, there.start, there.nominal_poses)
     states: list[dict] = [dict(poses) for poses in (*history, history[-1])]
     for edit in edits:
         edit(states)
@@ -91,7 +91,7 @@ def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds =
     return judge(
         there.assembly,
         ReachedState(tuple(snapshots[:-1]), snapshots[-1]),
-        there.goals,
+        there.nominal_poses,
         Criteria(thresholds, CLEARANCE_MM),
     )
 

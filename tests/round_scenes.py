@@ -63,7 +63,7 @@ def scenario(
         part_files=files,
         colors={},
         start={"table": np.eye(4), **start},
-        goals=np.array(goals),
+        nominal_poses=np.array(goals),
         attach=(),
         grasps=tuple(grasps),
         site=Site((0.1, 0.0), (0.03, 0.03), (-0.3, 0.3)),

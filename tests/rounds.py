@@ -122,7 +122,7 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
     first = {operation.main: k for k, operation in reversed(list(enumerate(of.assembly.operations)))}
     start = dict(of.start)
     for i, (part, k) in enumerate(sorted(first.items())):
-        T = np.array(of.goals[k])
+        T = np.array(of.nominal_poses[k])
         low, _ = measure_world_bounds([(of.assembly.solids[part], T)])
         T[:3, 3] += (0.2 * i - 0.5, 0.45, -low[2]) - T[:3, 3] * (1, 1, 0)
         start[part] = T
@@ -132,7 +132,7 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
     values |= {
         "assembly": of.assembly,
         "start": start,
-        "goals": of.goals,
+        "nominal_poses": of.nominal_poses,
         "part_files": {},
         "colors": {},
         "human_error": None,

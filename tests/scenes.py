@@ -127,7 +127,7 @@ class Scene:
 
     assembly: Assembly
     start: Mapping[str, Array]
-    goals: Array
+    nominal_poses: Array
 
 
 def touch(manipulated: str, environment: str, *pairs: str) -> tuple[Contact, ...]:
@@ -267,7 +267,7 @@ def human_error(name: str, mm: float, low_mm: float = 0.0) -> tuple[Scene, Array
         low_mm: How far a stick sinks in its slot or hole, the clearance, before it is seen.
     """
     built = ALL[name]()
-    goals = ALL[name]().goals.copy()
+    goals = ALL[name]().nominal_poses.copy()
     goals[[1, 2] if name == "fixture" else [1], 0 if name == "pockets" else 1, 3] += mm * 1e-3
     lying = {"stick_in_tower": [2], "subassembly_on_castles": [3], "fixture": [4], "pockets": [4]}[name]
     goals[lying, 2, 3] -= low_mm * 1e-3
@@ -282,15 +282,15 @@ def noisy(goals: Array, rng: np.random.Generator, mm: float, deg: float) -> Arra
 def turned(scene: Scene, T_world: Array) -> Scene:
     """The same scene in another world frame."""
     start = {part: T_world @ T for part, T in scene.start.items()}
-    return Scene(scene.assembly, start, T_world @ scene.goals)
+    return Scene(scene.assembly, start, T_world @ scene.nominal_poses)
 
 
 def shown(scene: Scene, human_error_scale: Array | None = None) -> Demonstration:
     """A demonstration that shows the true goals."""
     n = len(scene.assembly)
-    final = compute_placements(scene.assembly, scene.start, scene.goals)[-1]
+    final = compute_placements(scene.assembly, scene.start, scene.nominal_poses)[-1]
     added = np.zeros((n, 6, 6)) if human_error_scale is None else human_error_scale
-    return Demonstration(scene.assembly, scene.start, scene.goals, final, added)
+    return Demonstration(scene.assembly, scene.start, scene.nominal_poses, final, added)
 
 
 def seen(scene: Scene, goals: Array) -> Observation:

@@ -75,9 +75,7 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(
-        *(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data", "film", "range", "tables"))
-    )
+    optional = stated(*(extras[name] for name in ("cad", "ray", "view", "dm", "data", "film", "range", "tables")))
     assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT) - ASKED_FOR
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional
@@ -101,7 +99,7 @@ def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) ->
     path = tmp_path / "pyproject.toml"
     path.write_text(
         '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\n'
-        "optional-dependencies = {fast = [], dm = [], data = [], film = [], range = []}\n"
+        "optional-dependencies = {dm = [], data = [], film = [], range = []}\n"
     )
     with pytest.raises(ValueError, match="'d' states no version"):
         lowest(path)

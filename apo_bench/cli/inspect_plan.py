@@ -67,7 +67,7 @@ def plan_command(
     predicted_success = None
     if observation is None:
         task = load_scenario(scenario)
-        plan = Plan(task.assembly, task.start, task.goals)
+        plan = Plan(task.assembly, task.start, task.nominal_poses)
         where = "at the nominal poses; directions and poses in the frame of the assembly"
     else:
         method = method or CORRECTOR

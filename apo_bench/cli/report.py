@@ -5,19 +5,13 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.shared import SecretSeedFile, make_path_argument
+from apo_bench.cli.shared import make_path_argument
 from apo_bench.io import clean, has_parquet
 
 
 def report_command(
     folder: Annotated[Path, make_path_argument("FOLDER", "Folder that `sweep --out` wrote.")],
-    pictures: Annotated[
-        int, typer.Option(min=0, max=100, help="Largest number of failures to draw; each one runs again for it.")
-    ] = 6,
-    secret_seed_file: SecretSeedFile = None,
-    trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="For pictures, import and run the code that the records name.")
-    ] = False,
+    pictures: Annotated[int, typer.Option(min=0, max=100, help="Largest number of failures to draw.")] = 6,
 ) -> None:
     """Write report.html, which opens offline, with tables (CSV, Parquet) and figures (SVG, PNG).
 
@@ -30,7 +24,7 @@ def report_command(
     from apo_bench.cli.rates import print_rates
     from apo_bench.viz.failure_pictures import failure_pictures
 
-    made = report(folder, pictures, secret_seed_file, trust_code=trust_code, draw=failure_pictures)
+    made = report(folder, pictures, failure_pictures)
     print_rates(made.conditions)
     endings = ".csv and .parquet" if has_parquet() else ".csv (.parquet needs the package pyarrow)"
     lines = [

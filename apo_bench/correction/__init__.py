@@ -12,7 +12,7 @@ What one correction by `contact` calls, in the folder `contact` unless another i
           problem.problem_of                contacts become equations (solvers.projected_contacts), noise becomes L
           solved.solve                      the nearest poses with rank, covariance and test
             solvers.gauss_newton._nearest   the loop; each iteration linearises the equations, then takes the shortest z
-                                            on them (solvers.linear_step, solvers.sparse, or solvers.kernels compiled)
+                                            on them (solvers.linear_step, solvers.sparse)
             squared_length.chi_squares      the squared length of the correction
             solved._describe                gaps, rank and covariance (solvers.posterior)
             solved._describe_in_full        instead, where contacts contradict each other, or with inequalities, play or

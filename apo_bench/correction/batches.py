@@ -5,7 +5,7 @@ from math import ceil
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation
-from apo_bench.correction.checks.correction_checks import check_observation
+from apo_bench.correction.checks.correction_checks import check_observations
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.errors import require
@@ -36,8 +36,8 @@ def correct_many(
     if not observations:
         return ()
     first = observations[0]
+    check_observations(observations, [f"observation {i + 1}" for i in range(len(observations))])
     for i, observation in enumerate(observations, start=1):
-        check_observation(observation, f"observation {i}")
         require(
             _is_comparable(first, observation),
             f"observation {i} is of another assembly, start or play than observation 1; "

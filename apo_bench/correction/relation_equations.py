@@ -106,11 +106,10 @@ class RelationEquations:
 def by_relation(assembly: Assembly, system: CompactEquations, Jt: Array, kept: NDArray[np.bool_]) -> RelationEquations:
     """Group the equations of all contacts, in the order of `assembly.relations()`; those not `kept`, (c,), are void."""
     arcs = assembly.arcs()
-    operations = []
-    for arc in arcs:
-        said = [i for i in arc if kept[i]]
-        operations.append(frozenset(int(j) for j in system.words.columns[said].ravel() if j < system.n))
-    return RelationEquations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
+    contact, letter = system.words.incidence
+    known = system.words.operation[letter]
+    operations = tuple(frozenset(known[np.isin(contact, [i for i in arc if kept[i]])].tolist()) for arc in arcs)
+    return RelationEquations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, operations)
 
 
 def _rank(Jt: Array) -> int:

@@ -115,8 +115,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `assumed_robot_error`: what a robot that probes assumes: `matched`, `unknown`, or standard deviations.
     - `max_reobservations`: how often `env.unwrapped.reobserve(operations)`, or a corrector, may observe operations
       again.
-    - `min_predicted_success`: a plan with a lower predicted success is not executed: reward 0, stage `promise`, code
-      `abstained`. 0 executes every plan.
+    - `min_predicted_success`: a plan with a lower predicted success is not executed: reward 0, stage
+      `predicted-success`, code `abstained`. 0 executes every plan.
     - `fidelity`: `full`, or `near-contact`, which simulates only where parts may touch, in a third of the time.
     - `render_mode`: `rgb_array` renders arm and parts before the step, and the end of the replay after it, without a
       display; `rgb_array_list` the frames of the replay; `human` opens a window when the replay begins.

@@ -100,7 +100,7 @@ def make_plate_mesh(scenario: Scenario, clearance_mm: float) -> Any:
     from trimesh.boolean import difference, intersection
     from trimesh.creation import box
 
-    middle = np.append(_MM * scenario.goals[-1][:2, 3], 0.0)
+    middle = np.append(_MM * scenario.nominal_poses[-1][:2, 3], 0.0)
     table = make_part_mesh(scenario.assembly.solids["table"], clearance_mm).apply_translation(-middle)
     plate = box(bounds=((-_PLATE_MM / 2, -_PLATE_MM / 2, -_PLATE_THICK_MM), (_PLATE_MM / 2, _PLATE_MM / 2, 0.0)))
     papers = [

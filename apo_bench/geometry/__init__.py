@@ -68,7 +68,7 @@ from apo_bench.geometry.symmetry import (
     list_quarter_turns,
     make_turn,
 )
-from apo_bench.geometry.twist import ADJOINTS, GENERATORS, SERIES, compute_exp_and_jacobian, compute_right_jacobian
+from apo_bench.geometry.twist import ADJOINTS, GENERATORS, compute_exp_and_jacobian, compute_right_jacobian
 
 __all__ = (
     "ADJOINTS",
@@ -77,7 +77,6 @@ __all__ = (
     "GENERATORS",
     "PAD_M",
     "SAGITTA_M",
-    "SERIES",
     "TOUCH_M",
     "WHOLE_TURN",
     "Array",

@@ -51,7 +51,7 @@ _TO_MATRIX = np.ascontiguousarray(GENERATORS[:, :3].reshape(6, 12))
 ADJOINTS = _adjoints()
 """The adjoint matrix of a twist xi is sum_i xi_i ADJOINTS[i], (6, 6, 6)."""
 _TO_ADJOINT = ADJOINTS.reshape(6, 36)
-SERIES = _series()
+_COEFFICIENTS = _series()
 _ONE4 = np.eye(4)
 _ONE6 = np.eye(6)
 _SUM = np.ones(3)
@@ -69,7 +69,7 @@ def compute_exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     lead = xi.shape[:-1]
     # The coefficients of the powers of ad are power series in the squared angle q.
     q = (xi[..., 3:] * xi[..., 3:]) @ _SUM
-    series = SERIES[: _SHORT if (q < 1.0).all() else _TERMS]
+    series = _COEFFICIENTS[: _SHORT if (q < 1.0).all() else _TERMS]
     f = ((q[..., None] ** _POWERS[: len(series)]) @ series[:, 2:])[..., None, None]
     a, b, c, d = (f[..., i, :, :] for i in range(4))
     X = (xi @ _TO_MATRIX).reshape(*lead, 3, 4)

@@ -22,6 +22,13 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
 
     Raises:
         InputError: The file cannot be read, or a solid makes no part.
+
+    Examples:
+        >>> import apo_bench, tempfile, trimesh
+        >>> folder = tempfile.mkdtemp()
+        >>> mesh = trimesh.creation.box((60, 40, 20)).export(f"{folder}/plate.stl")
+        >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
+        ['plate.xml']
     """
     from apo_bench.importers.cad.importing import import_solid as write_part
     from apo_bench.importers.cad.importing import raw_solids
@@ -67,6 +74,16 @@ def import_assembly(
     Raises:
         InputError: A file cannot be read, a solid makes no part, or the scenario file exists.
         RuntimeError: There is no order in which the parts can be assembled.
+
+    Examples:
+        >>> import apo_bench, tempfile, trimesh
+        >>> folder = tempfile.mkdtemp()
+        >>> plate, block = trimesh.creation.box((60, 50, 20)), trimesh.creation.box((30, 30, 40))
+        >>> files = [f"{folder}/plate.stl", f"{folder}/block.stl"]
+        >>> meshes = plate.export(files[0]), block.apply_translation((0, 0, 30)).export(files[1])
+        >>> scenario = apo_bench.import_assembly(files, f"{folder}/clamp.toml", unit="mm")
+        >>> [operation.main for operation in scenario.assembly.operations]
+        ['block']
     """
     from apo_bench.importers.assembly.from_cad import import_parts as write_parts
     from apo_bench.importers.assembly.from_poses import scenario_from_poses

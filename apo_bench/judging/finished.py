@@ -46,7 +46,7 @@ def judge_finished(
     limits = judge.thresholds
     true = compute_placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
-    moved = faults_of_place(judge.known, reached.after, final, displaced, away, seen, limits.displaced_mm)
+    moved = faults_of_place(judge.known, reached.after, final, displaced, away, seen, limits.placed_part_shift_mm)
     return judgement(
         judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],

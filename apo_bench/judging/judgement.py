@@ -34,7 +34,7 @@ class Judgement:
     angle_deg: float | None
     overlap: float | None
     penetration_mm: float | None
-    displaced_mm: float | None
+    placed_part_shift_mm: float | None
     """How far a part that was in place was moved in the room at most, whether or not this rule minds. The finished
     assembly is judged by other lengths: how far movable parts slid on each other, and this one of parts in a mate of a
     fixed part."""
@@ -73,7 +73,7 @@ def judgement(
         "gap": any(not c.touching for c in contacts),
         "overlap": any(not c.covering for c in contacts),
         "penetration": any(not s.penetration_m * 1e3 <= thresholds.penetration_mm for s in states),
-        "pushed": any(not push <= thresholds.displaced_mm for _, push in pushes),
+        "pushed": any(not push <= thresholds.placed_part_shift_mm for _, push in pushes),
         "not_released": any(not s.released for s in states),
         "not_at_rest": any(not _rests(s, thresholds) for s in states),
     }
@@ -87,7 +87,7 @@ def judgement(
         angle_deg=max((c.angle_deg for c in contacts), default=None),
         overlap=min((c.overlap for c in contacts), default=None),
         penetration_mm=max((s.penetration_m * 1e3 for s in states), default=None),
-        displaced_mm=max((push for _, push in pushes) if disturbed is None else disturbed, default=None),
+        placed_part_shift_mm=max((push for _, push in pushes) if disturbed is None else disturbed, default=None),
     )
 
 
@@ -105,7 +105,7 @@ def _why(
         return f"{deepest:.2f} mm deep, where {thresholds.penetration_mm:g} mm are allowed"
     if fault == "pushed":
         part, push = max(pushes, key=lambda found: found[1])
-        return f"{part} by {push:.2f} mm, where {thresholds.displaced_mm:g} mm are allowed"
+        return f"{part} by {push:.2f} mm, where {thresholds.placed_part_shift_mm:g} mm are allowed"
     return ""
 
 

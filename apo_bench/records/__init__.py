@@ -2,11 +2,12 @@
 
 from apo_bench.records.contact_sources import (
     DETECTED,
+    FACE_OFFSET_MM,
     GIVEN,
-    SHIFT_MM,
     WRONG,
     WRONG_CONTACTS,
     normalise_contact_source,
+    parse_face_offset,
 )
 from apo_bench.records.ft_sensor import USUAL_FT_SENSOR, FtNoise, normalise_ft_sensor, parse_ft_noise
 from apo_bench.records.limits import USUAL_LIMITS, Limits
@@ -55,7 +56,6 @@ from apo_bench.records.robot_error import (
 )
 from apo_bench.records.secret_seed import (
     SecretSeed,
-    check_same_secret_seed,
     describe_secret_seed,
     find_common_secret_seed,
     open_secret_seed,
@@ -89,6 +89,7 @@ __all__ = (
     "DETECTED",
     "ENV_ID",
     "EVALUATION_STARTS",
+    "FACE_OFFSET_MM",
     "FAILURES",
     "FIRST_TRAINING_TRIAL",
     "FOREIGN_ARMS",
@@ -106,7 +107,6 @@ __all__ = (
     "REQUIRED",
     "RESIDUALS",
     "SETTINGS",
-    "SHIFT_MM",
     "SIMULATED",
     "STAGES",
     "USUAL",
@@ -133,7 +133,6 @@ __all__ = (
     "affects",
     "check",
     "check_grip",
-    "check_same_secret_seed",
     "check_together",
     "convert_to_python_units",
     "describe_outcome",
@@ -152,6 +151,7 @@ __all__ = (
     "normalise_robot_error",
     "open_secret_seed",
     "parse_assumed_error",
+    "parse_face_offset",
     "parse_ft_noise",
     "parse_method",
     "parse_noise_level",

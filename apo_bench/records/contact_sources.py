@@ -3,7 +3,7 @@
 `given`             the correct contacts
 `false-negative`    one contact is missing
 `false-positive`    one contact too many
-`shifted:3`         one face is 3 mm away from where the model of its part has it
+`face-offset:3mm`   one face lies 3 mm off the face of the part's model
 `detected`          detected in the observed poses; `detected-jointly` estimates contacts and poses together
 `module:name`       your own function
 """
@@ -15,9 +15,9 @@ from apo_bench.errors import require, require_known, require_text
 
 WRONG_CONTACTS = MappingProxyType(
     {
-        "false-negative": "apo_bench.perception.observation.wrong_contacts:missed",
-        "false-positive": "apo_bench.perception.observation.wrong_contacts:false",
-        "shifted": "apo_bench.perception.observation.wrong_contacts:Shifted",
+        "false-negative": "apo_bench.perception.observation.wrong_contacts:omit_contact",
+        "false-positive": "apo_bench.perception.observation.wrong_contacts:add_contact",
+        "face-offset": "apo_bench.perception.observation.wrong_contacts:FaceOffset",
     }
 )
 """Sources of wrong contacts."""
@@ -26,29 +26,41 @@ GIVEN = "given"
 WRONG = tuple(WRONG_CONTACTS)
 DETECTED = ("detected", "detected-jointly")
 _KINDS = (GIVEN, *WRONG, *DETECTED)
-SHIFT_MM = 2.0
-_LARGEST_SHIFT_MM = 50.0
+FACE_OFFSET_MM = 2.0
+"""Default of `face-offset`."""
+_LARGEST_OFFSET_MM = 50.0
 
 
 def normalise_contact_source(text: str) -> str:
-    """The canonical name of a contact source: `shifted` is `shifted:2`, `shifted:3.0` is `shifted:3`.
+    """The canonical name of a contact source: `face-offset:3.0mm` is `face-offset:3mm`.
 
     Raises:
         InputError: A size that is not allowed.
     """
     kind, _, size = text.partition(":")
-    if kind != "shifted":
+    if kind != "face-offset":
         return text
+    offset_mm = parse_face_offset(text) if size else FACE_OFFSET_MM
+    return f"face-offset:{offset_mm:g}mm"
+
+
+def parse_face_offset(text: str) -> float:
+    """The size in `face-offset:3mm`, [mm].
+
+    Raises:
+        InputError: It has no unit, is no number, or is out of range.
+    """
+    size = text.partition(":")[2]
     try:
-        size_mm = float(size or SHIFT_MM)
+        offset_mm = float(size.removesuffix("mm")) if size.endswith("mm") else math.nan
     except ValueError:
-        size_mm = math.nan
+        offset_mm = math.nan
     require(
-        0.0 < size_mm <= _LARGEST_SHIFT_MM,
-        f"the contact source '{text}' was given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
-        "shifted:3.",
+        0.0 < offset_mm <= _LARGEST_OFFSET_MM,
+        f"contact source '{text}': the offset must be above 0 and at most {_LARGEST_OFFSET_MM:g} mm, with its unit, as "
+        "in face-offset:3mm.",
     )
-    return f"shifted:{size_mm:g}"
+    return offset_mm
 
 
 def checked_contact_source(text: str) -> str:
@@ -56,8 +68,8 @@ def checked_contact_source(text: str) -> str:
     require_text("contact source", text)
     name = normalise_contact_source(text)
     require(
-        name.partition(":")[0] not in _KINDS or name in _KINDS or name.startswith("shifted:"),
-        f"the contact source '{text}' was given; only shifted has a size, as in shifted:3.",
+        name.partition(":")[0] not in _KINDS or name in _KINDS or name.startswith("face-offset:"),
+        f"contact source '{text}': only face-offset takes a size, as in face-offset:3mm.",
     )
     if ":" not in name:
         require_known("contact source", name, _KINDS, rest=" Or give your own as 'package.module:name'.")

@@ -7,7 +7,7 @@ outcome is made; no other words appear in a record.
 from types import MappingProxyType
 
 STAGES = (
-    *("demonstrate", "observe", "correct", "promise", "plan", "touch", "pick", "lift", "carry", "attach"),
+    *("demonstrate", "observe", "correct", "predicted-success", "plan", "touch", "pick", "lift", "carry", "attach"),
     *("release", "depart", "judge", "worker"),
 )
 """Where a trial can fail, in the order of a trial, and last the process that runs it; `done` is where one that did not
@@ -26,7 +26,7 @@ CODES = MappingProxyType(
         "not_converged": "the solver did not come to rest within its iterations",
         "not_finite": "the correction holds a number that is not finite",
         "raised": "the corrector raised an error or returned what it must not",
-        # promise
+        # predicted-success
         "abstained": "the predicted success is too low",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",

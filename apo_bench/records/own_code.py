@@ -1,9 +1,9 @@
 """Find code of the user, `package.module:name`, among the names in a record.
 
-A record is data: what it names is imported only if it comes with the package, or if a person trusts the folder.
+A record is data: what it names is imported only if it comes with the package.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from apo_bench.records.contact_sources import WRONG
@@ -22,8 +22,6 @@ DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
     "contact_source": tuple(f"{kind}:" for kind in WRONG),
 }
 """Column -> how names with a colon begin that are data."""
-_MOST = 3
-"""Names in the sentence."""
 
 
 def own_code(record: Mapping[str, Any]) -> tuple[str, ...]:
@@ -35,17 +33,3 @@ def own_code(record: Mapping[str, Any]) -> tuple[str, ...]:
 def is_own_code(column: str, name: str) -> bool:
     """Whether a name in a column is `module:name`, and has none of the `DATA_PREFIXES`."""
     return ":" in name and not name.startswith(DATA_PREFIXES[column])
-
-
-def describe_own_code(records: Iterable[Mapping[str, Any]]) -> str:
-    """The sentence on failed trials that a report does not run again; empty if there are none."""
-    found = [names for record in records if record["success"] is False and (names := own_code(record))]
-    if not found:
-        return ""
-    distinct = list(dict.fromkeys(name for each in found for name in each))
-    more = f" and {len(distinct) - _MOST} more" * (len(distinct) > _MOST)
-    many = "1 failed trial names" if len(found) == 1 else f"{len(found):,} failed trials name"
-    return (
-        f"{many} code that does not come with the package ({', '.join(distinct[:_MOST])}{more}); a report runs it only "
-        "with --trust-code"
-    )

@@ -132,7 +132,7 @@ class TrialRecord(_Columns, total=False):
     """Smallest overlap of faces that should touch, as a part of the true overlap."""
     penetration_mm: _Number | None
     """Largest depth of one part in another [mm]."""
-    displaced_mm: _Number | None
+    placed_part_shift_mm: _Number | None
     """Largest distance by which a part that was in place was moved, whether or not it counts [mm]."""
     corrected_operations: list[_Operation] | None
     """Operations whose motion parameters were corrected."""

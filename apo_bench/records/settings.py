@@ -167,14 +167,14 @@ class TrialConfig:
         default="given",
         metadata=about(
             "Where the corrector's contacts come from: given (correct), detected, detected-jointly, or wrong ones: "
-            "false-negative, false-positive, shifted:3 (mm)",
+            "false-negative, false-positive, face-offset:3mm",
             spelled=checked_contact_source,
             key=True,
             axis=True,
         ),
     )
     """Where the corrector's contacts come from: `given`, `detected`, `detected-jointly`, or wrong ones:
-    `false-negative`, `false-positive`, `shifted:3` (mm), or `module:name`."""
+    `false-negative`, `false-positive`, `face-offset:3mm`, or `module:name`."""
     method: Name = field(
         default=CORRECTOR,
         metadata=about(

@@ -23,7 +23,7 @@ class Thresholds:
     """Strict and loose: the faces overlap by at least this part of the true overlap."""
     penetration_mm: float = 0.05
     """Strict: no two physical geoms of different parts are deeper in each other."""
-    displaced_mm: float = 1.0
+    placed_part_shift_mm: float = 1.0
     """Strict: no two parts that touch slid against each other by more; as demonstrated: no part that was in place moved
     its centre by more at any later moment, or a corner at the end."""
     rest_mm_s: float = 1.0

@@ -21,7 +21,7 @@ _THROUGH = 1e-3
 def list_nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
     """The operations of a scenario at its nominal poses."""
     lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, lines)
+    return understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, lines)
 
 
 def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
@@ -33,7 +33,7 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
     Raises:
         InputError: A stated direction leads through what the part has to touch, or a stated line begins inside of it.
     """
-    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals, stated)
+    operations = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses, stated)
     for each, preference in zip(operations, stated, strict=True):
         _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in operations))

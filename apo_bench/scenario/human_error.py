@@ -59,7 +59,7 @@ def compute_human_error_covariance(scenario: Scenario, human_error_scale: float)
     covariance = np.zeros((len(scenario.assembly), 6, 6))
     if scenario.human_error is not None:
         rms = human_error_scale * scenario.human_error.rms_m
-        way = spread_error(scenario, Layout(scenario.goals, scenario.start), scenario.human_error.axis).offsets
+        way = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), scenario.human_error.axis).offsets
         covariance[:, :3, :3] = rms**2 * np.einsum("ni,nj->nij", way, way)
     return covariance
 

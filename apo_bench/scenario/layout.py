@@ -58,7 +58,7 @@ def place_layout(
     Goals are T_world_assembly T_assembly_part, each shifted, then turned, in the frame of its own part.
     """
     T_world_assembly = pose.at((x_m, y_m, 0.0), (0.0, 0.0, np.degrees(yaw_rad)))
-    goals = T_world_assembly @ scenario.goals
+    goals = T_world_assembly @ scenario.nominal_poses
     lengths = [0.0] * len(scenario.shifts) if shifts_m is None else shifts_m
     for shift, length in zip(scenario.shifts, lengths, strict=True):
         goals[shift.operation] = goals[shift.operation] @ pose.at(length * shift.axis)
@@ -92,7 +92,7 @@ def find_nominal_start(scenario: Scenario) -> Poses:
 class Layouts(NamedTuple):
     """The truth of many trials."""
 
-    goals: Array
+    poses: Array
     """(n, k, 4, 4): of k operations, world frame, [m]."""
     start: Poses
     """Part -> (n, 4, 4)."""

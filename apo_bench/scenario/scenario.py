@@ -135,7 +135,7 @@ class Scenario:
     """Part -> red, green and blue, from 0 to 1."""
     start: Poses
     """Part -> its pose before the demonstration, (4, 4), world frame, [m]; fixed parts stay there."""
-    goals: Array
+    nominal_poses: Array
     """(n, 4, 4): nominal poses that satisfy every contact, frame of the assembly, [m]."""
     attach: tuple[Attach, ...]
     """The insertion axis of every operation, stated or found."""
@@ -163,4 +163,4 @@ class Scenario:
     """The scenario file."""
 
     def __post_init__(self) -> None:
-        freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4), part_files=None, colors=None)
+        freeze(self, nominal_poses=(len(self.assembly), 4, 4), start=(4, 4), part_files=None, colors=None)

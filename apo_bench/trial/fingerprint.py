@@ -19,7 +19,6 @@ _SCHEMAS = (RECORD_SCHEMA, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 _PACKAGES = (
     *("apo_bench", "mujoco", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
-    "numba",  # optional: without it records are only rounded otherwise
 )
 """The packages whose version may show in a record."""
 _CHECKOUT = Path(__file__).parents[2]

@@ -73,7 +73,7 @@ class _Held(NamedTuple):
 class FreeSpace:
     """Goals that satisfy the contacts as well as some do, by coordinates s in free directions; there s is 0."""
 
-    goals: Array
+    poses: Array
     """(n, 4, 4), world frame, [m]."""
     twists: Array
     """(n, 6, f): the body twists of one standard deviation along each free direction, [m, rad]."""
@@ -84,7 +84,7 @@ class FreeSpace:
 
     def tangent(self, s: Array) -> Array:
         """Goals moved along free directions, (n, 4, 4); contacts hold to first order."""
-        return np.asarray(self.goals @ pose.exp(self.twists @ s))
+        return np.asarray(self.poses @ pose.exp(self.twists @ s))
 
     def place(self, s: Array) -> Array | None:
         """The same, put back onto the contacts; None if that cannot be."""

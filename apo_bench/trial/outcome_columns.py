@@ -110,7 +110,7 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> TrialRe
         "worst_angle_deg": replace_infinite(conditions.angle_deg),
         "least_overlap": replace_infinite(conditions.overlap),
         "penetration_mm": replace_infinite(conditions.penetration_mm),
-        "displaced_mm": replace_infinite(conditions.displaced_mm),
+        "placed_part_shift_mm": replace_infinite(conditions.placed_part_shift_mm),
         "reached": _poses(result.reached.final),
         "pose_error_fixed_mm": replace_infinite(fixed),
         "pose_error_free_mm": replace_infinite(free),

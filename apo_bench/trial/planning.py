@@ -54,7 +54,7 @@ def apply_method(
             return _uncorrected(observation, truth, None)
         if method == "nominal" and where is not None and observation.observed.any():
             scenario = where.scenario if isinstance(where, Scene) else where
-            return _uncorrected(observation, fit_nominal_poses(scenario.goals, observation), None)
+            return _uncorrected(observation, fit_nominal_poses(scenario.nominal_poses, observation), None)
         if method == "uncorrected" or (method == "nominal" and where is not None):
             return _uncorrected(observation, observation.poses, observation_failure(observation))
     correction = correct(observation, resolve_simulated(method), reobserve)

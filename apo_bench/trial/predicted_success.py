@@ -67,7 +67,7 @@ class PossibleTruth(NamedTuple):
 
     weight: float
     believed: Observation
-    goals: Array
+    poses: Array
     """(n, 4, 4), world frame, [m]."""
     dropped: tuple[str, ...] = ()
     turned: bool = False
@@ -121,7 +121,7 @@ def abstain(predicted_success: float, least: float) -> Outcome:
     # as many digits as tell the two apart: 0.947, where 0.95 is required
     shown = next(text for digits in range(2, 20) if float(text := f"{predicted_success:.{digits}f}") < least)
     why = f": {shown}, where {least:.15g} is required"
-    return Outcome("promise", "abstained", None, describe_outcome("abstained") + why)
+    return Outcome("predicted-success", "abstained", None, describe_outcome("abstained") + why)
 
 
 def plan_score(
@@ -185,7 +185,7 @@ def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
 
 def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
     """Draw poses that may be the truth, (count, n, 4, 4), along what contacts leave free."""
-    goals = explanation.goals
+    goals = explanation.poses
     try:
         space = free_space(explanation.believed, goals)
     except InputError:

@@ -28,7 +28,7 @@ class Rollout:
     segments: tuple[Segment, ...]
     assembled: Poses
     """Where the parts belong in the end."""
-    goals: Mapping[str, Array] = field(default_factory=dict)
+    poses: Mapping[str, Array] = field(default_factory=dict)
     """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
 
 

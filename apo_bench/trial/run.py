@@ -218,7 +218,7 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
     """Execute a plan and judge what it reached, with the nominal poses in place of a truth that is not known."""
     config = context.config
     scene = context.scene
-    reference = move_nominal_poses(scene.scenario.goals, observation) if truth is None else truth
+    reference = move_nominal_poses(scene.scenario.nominal_poses, observation) if truth is None else truth
     _, spiral, probe = parse_method(config.method)
     error = draw_robot_error(config.robot_error, scene, config.seed, config.secret_seed)
     probing = None

@@ -121,7 +121,7 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: floa
 
     assert simulated.images is not None, "simulate the demonstration with pose_source='depth-camera'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
-    turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
+    turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.nominal_poses[:, :3, :3]
     camera = simulated.images
     return RangeSensor(camera.finder, camera.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
 
@@ -210,7 +210,7 @@ def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...
     shift, turn = drawn(HAND_EYE, (2, 3))
     hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * shift, sigmas.hand_eye[1] * turn)
     middle = np.eye(4)
-    middle[:3, 3] = scene.scenario.goals[:, :3, 3].mean(axis=0)
+    middle[:3, 3] = scene.scenario.nominal_poses[:, :3, 3].mean(axis=0)
     # turned about the middle of the goals: E becomes T_m E T_m^-1
     if sigmas.hand_eye != (0.0, 0.0):
         hand_eye = middle @ hand_eye @ pose.inverse(middle)

@@ -1,8 +1,4 @@
-"""Pictures of a sample of trials that failed; most run again for it.
-
-A trial runs again only where settings, assets and code are those of its record, by its hash. Else the picture shows the
-parts where the record says that they ended; also where the secret seed of a trial is missing.
-"""
+"""Pictures of a sample of trials that failed: the parts where their records say that they ended."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -17,8 +13,7 @@ from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.io import read_lines
-from apo_bench.records import SecretSeed, TrialConfig, TrialRecord, get_record_key, restore_settings
-from apo_bench.records.own_code import describe_own_code, own_code
+from apo_bench.records import TrialConfig, TrialRecord, get_record_key, restore_settings
 from apo_bench.records.run.replay_command import Files
 from apo_bench.records.run.validation import record_of
 
@@ -29,34 +24,25 @@ _ELEVATION_DEG = -24.0
 _ARROW_M = 0.11  # how far from its contact an arrow begins
 _TIP_M = 0.012  # and ends
 _ARROW = (0.85, 0.1, 0.1)
-_SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
-"""Columns that are equal if a trial ends as before."""
 
 
 def failure_pictures(
-    chosen: Sequence[TrialRecord],
-    folder: Path,
-    files: Files | None = None,
-    secret_seed: SecretSeed | None = None,
-    *,
-    trust_code: bool = False,
+    chosen: Sequence[TrialRecord], folder: Path, files: Files
 ) -> tuple[list[FailurePicture], list[str]]:
-    """The pictures that could be made, and sentences on those that could not.
+    """Draw failed trials.
 
     Args:
         folder: Of the sweep, whose records say where parts ended.
         files: Scenario -> its file.
-        secret_seed: Of the trials, if they have one.
-        trust_code: Import the code that records name; else none of it is.
+
+    Returns:
+        The pictures that could be made, and sentences on those that could not.
     """
     pictures: list[FailurePicture] = []
     missed: list[str] = []
     for record in chosen:
-        if not trust_code and own_code(record):
-            missed.append(describe_own_code([record]))
-            continue
         try:
-            pictures.append(_draw_failure(record, folder, files or {}, secret_seed))
+            pictures.append(_draw_failure(record, folder, files))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
@@ -64,31 +50,23 @@ def failure_pictures(
     return pictures, list(dict.fromkeys(missed))
 
 
-def _draw_failure(record: TrialRecord, folder: Path, files: Files, secret_seed: SecretSeed | None) -> FailurePicture:
+def _draw_failure(record: TrialRecord, folder: Path, files: Files) -> FailurePicture:
     import imageio.v3 as iio
 
     from apo_bench.scenario.file import is_named
     from apo_bench.simulation.scene.render import draw_picture
     from apo_bench.trial.stages import scene_of
-    from apo_bench.viz.trial_again import why_different
 
     name = record["scenario"]
     require(name in files or is_named(name), f"run.json names no file of the scenario '{name}'")
-    config = replace(restore_settings(record, files.get(name, name)), secret_seed=secret_seed)
-    scene = scene_of(config)
-    draw_picture(scene, {}, 16, 12)  # fails at once where nothing can draw
+    # the arm is not in the picture, and may be code that the record names
+    scene = scene_of(replace(restore_settings(record, files.get(name, name)), arm=TrialConfig.arm))
+    poses = _read_poses(_whole_record(folder, record).get("reached"))
+    require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
     contact = _failed_contact(record, scene)
-    reason = why_different(record, config)
-    how = "how the replay ended, run again for this picture"
-    image = None if reason else _draw_again(record, config, contact)
-    if image is None:
-        poses = _read_poses(_whole_record(folder, record).get("reached"))
-        require(poses, f"of seed {record['seed']} of {name} the record does not say where the parts ended")
-        image = draw_picture(scene, poses, *_SIZE, _camera(scene, record, poses), _mark(contact, scene, poses))
-        reason = reason or "now it ends in another way"
-        how = f"where the parts ended, as the record says; {reason}, so it does not run again"
-    at = "" if contact is None else f"; the arrow points at {contact}"
-    return FailurePicture(record, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), f"{how}{at}")
+    image = draw_picture(scene, poses, *_SIZE, _camera(scene, record, poses), _mark(contact, scene, poses))
+    words = "where the parts ended" if contact is None else f"where the parts ended; the arrow points at {contact}"
+    return FailurePicture(record, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), words)
 
 
 def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
@@ -101,20 +79,6 @@ def _whole_record(folder: Path, record: TrialRecord) -> Mapping[str, Any]:
             if get_record_key(whole) == get_record_key(record):
                 return whole
     return {}
-
-
-def _draw_again(record: TrialRecord, config: TrialConfig, contact: Contact | None) -> Any:
-    """The last moment of the replay, with the arm; None if it ended in another way."""
-    from apo_bench.simulation.scene.render import picture_with_arm
-    from apo_bench.viz.trial_again import run_again
-
-    now, rollout = run_again(config)
-    if rollout is None or any(now.get(name) != record.get(name) for name in _SAME):
-        return None
-    poses = _read_poses(now["reached"])
-    last = rollout.segments[-1].moments[-1].qpos
-    camera = _camera(rollout.scene, record, poses)
-    return picture_with_arm(rollout.scene, poses, last, *_SIZE, camera, _mark(contact, rollout.scene, poses))
 
 
 def _failed_contact(record: TrialRecord, scene: Any) -> Contact | None:

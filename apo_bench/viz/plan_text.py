@@ -87,7 +87,7 @@ def describe_plan(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence
         notes: Assumptions, and what speaks against the plan.
     """
     start = find_nominal_start(scenario)
-    stages = (start, *compute_placements(scenario.assembly, start, scenario.goals))
+    stages = (start, *compute_placements(scenario.assembly, start, scenario.nominal_poses))
     forms = []
     for line in lines:
         stage = stages[line.operation if line.undo else line.operation + 1]

@@ -97,16 +97,16 @@ class Cursor:
         if k is not None:
             words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
         if self.shows_goals:
-            words += [f"{_COLORS[name][0]}: {name}" for name in self.rollout.goals]
+            words += [f"{_COLORS[name][0]}: {name}" for name in self.rollout.poses]
         if ending and self._is_last:
             words.append(ending)
         return tuple(words)
 
     def _offsets(self, k: int) -> list[str]:
         """How far poses and the part are from the true pose of an operation, in its own frame."""
-        if AS_TRUE not in self.rollout.goals:
+        if AS_TRUE not in self.rollout.poses:
             return []
-        placed = {name: poses[k] for name, poses in self.rollout.goals.items()}
+        placed = {name: poses[k] for name, poses in self.rollout.poses.items()}
         true = placed.pop(AS_TRUE)
         placed["as it is now"] = read_part_poses(self.segment, self.moment)[self._assembly.operations[k].main]
         lines = []
@@ -140,7 +140,14 @@ class Cursor:
         begun = self._assembly.first(k + 1)
         moved = {part for operation in begun.operations for part in operation.moves}
         overlays = []
-        for name, goals in self.rollout.goals.items():
+        for name, goals in self.rollout.poses.items():
             poses = compute_placements(begun, self.segment.start, goals[: k + 1])[-1]
             overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)
+
+
+def start_at_end(rollout: Rollout) -> Cursor:
+    """Return a cursor at the last moment, where the assembly and the outcome are seen, without names of faces."""
+    cursor = Cursor(rollout, faces="none")
+    cursor.go(len(cursor.places))
+    return cursor

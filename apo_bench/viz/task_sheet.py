@@ -56,7 +56,7 @@ def _describe_human_error(scenario: Scenario) -> str:
     if error is None:
         return "none"
     # a displaced face leads later operations astray
-    offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), error.axis).offsets
+    offsets = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), error.axis).offsets
     mains = [operation.main for operation in scenario.assembly.operations]
     astray = np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M)
     followers = [f"{mains[k]} (operation {k + 1})" for k in astray if k != error.operation]
@@ -98,7 +98,7 @@ def _describe_verdict(scenario: Scenario) -> dict[str, str]:
 def _list_wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
     """Contacts whose play is larger than the clearance, and their play [mm], at the nominal poses."""
     assembly = scenario.assembly
-    history = compute_placements(assembly, scenario.start, scenario.goals)
+    history = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     for contact, operation, _ in assembly.relations():
         play = compute_joint_play_mm(assembly, contact, operation, history[operation], scenario.clearance_mm)
         if play is not None and play > scenario.clearance_mm:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from apo_bench.errors import InputError
 from apo_bench.io import read_lines
-from apo_bench.records import TrialConfig, TrialRecord, read_secret_seed, restore_settings
+from apo_bench.records import TrialRecord, read_secret_seed, restore_settings
 from apo_bench.records.own_code import own_code
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.validation import record_of
@@ -38,28 +38,18 @@ def repeat_trial(folder: Path, number: int | None, secret_seed_file: Path | None
     config = restore_settings(record, scenario_files(read_run(folder)).get(name, name))
     if secret_seed_file is not None:
         config = replace(config, secret_seed=read_secret_seed(secret_seed_file))
-    if reason := why_different(record, config):
-        raise RuntimeError(f"trial {number} of {folder} cannot run again: {reason}.")
-    again, rollout = run_again(config)
-    if rollout is None:
-        raise RuntimeError(f"the robot did not replay anything in trial {number}: {again['sentence']}.")
-    return again, rollout
-
-
-def why_different(record: TrialRecord, config: TrialConfig) -> str:
-    """Why these settings would not give the trial of a record again; empty if they would."""
     content = content_hash(load_scenario(config.scenario), config.scenario, find_arm(config.arm).files)
-    if config_hash(config, content) == record.get("config_hash"):
-        return ""
-    secret = record.get("secret_seed") is not None and config.secret_seed is None
-    return "its secret seed is missing (--secret-seed-file)" if secret else "another version or other files made it"
-
-
-def run_again(config: TrialConfig) -> tuple[TrialRecord, Rollout | None]:
-    """The record and the rollout of a trial; None if the robot did not replay anything."""
+    if config_hash(config, content) != record.get("config_hash"):
+        secret = record.get("secret_seed") is not None and config.secret_seed is None
+        reason = (
+            "its secret seed is missing (--secret-seed-file)" if secret else "another version or other files made it"
+        )
+        raise RuntimeError(f"trial {number} of {folder} cannot run again: {reason}.")
     rollouts = list[Rollout]()
-    record = run_settings(Request(config.scenario), config, rollouts.append)
-    return record, rollouts[0] if rollouts else None
+    again = run_settings(Request(config.scenario), config, rollouts.append)
+    if not rollouts:
+        raise RuntimeError(f"the robot did not replay anything in trial {number}: {again['sentence']}.")
+    return again, rollouts[0]
 
 
 def _choose_trial(folder: Path, number: int | None) -> tuple[int, TrialRecord]:

@@ -19,7 +19,7 @@ _DECISIVE: Mapping[str, Line] = MappingProxyType(
     {
         "overlap": ("least overlap", "{least_overlap:.0%} of the true overlap"),
         "penetration": ("penetration", "{penetration_mm:.3f} mm"),
-        "pushed": ("displacement", "{displaced_mm:.2f} mm"),
+        "pushed": ("displacement", "{placed_part_shift_mm:.2f} mm"),
         "force_stop": ("peak force", "{peak_force_n:.1f} N"),
         "doubtful": ("p-value", "{p_value:.2g} of the consistency test"),
         "inconsistent": ("contact gap", "{gap_before_mm:.3f} mm observed"),

@@ -42,14 +42,14 @@ def random_scene(seed: int) -> scenes.Scene:
 
 def differences(scene: scenes.Scene, by: float = 1e-6) -> tuple[Array, Array]:
     """The analytic Jacobian and the one of central differences, by body twists of every goal."""
-    system = build_contact_equations(scene.assembly, scene.start, scene.goals)
-    _, J = system.linearise(scene.goals)
+    system = build_contact_equations(scene.assembly, scene.start, scene.nominal_poses)
+    _, J = system.linearise(scene.nominal_poses)
     numeric = np.zeros_like(J)
-    for k in range(len(scene.goals)):
+    for k in range(len(scene.nominal_poses)):
         for i in range(6):
             side = []
             for sign in (1.0, -1.0):
-                goals = scene.goals.copy()
+                goals = scene.nominal_poses.copy()
                 goals[k] = goals[k] @ pose.exp(sign * by * np.eye(6)[i])
                 side.append(system.residual(goals))
             numeric[:, 6 * k + i] = (side[0] - side[1]) / (2 * by)
@@ -67,8 +67,8 @@ def test_jacobian_of_random_assemblies(seed: int) -> None:
 @settings(max_examples=20, deadline=None)
 def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
     scene = random_scene(seed)
-    e = build_contact_equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
-    history = compute_placements(scene.assembly, scene.start, scene.goals)
+    e = build_contact_equations(scene.assembly, scene.start, scene.nominal_poses).residual(scene.nominal_poses)
+    history = compute_placements(scene.assembly, scene.start, scene.nominal_poses)
     row = 0
     for contact, made, _ in scene.assembly.relations():
         m, b = contact
@@ -96,8 +96,10 @@ def scenes_area(face) -> float:
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     scene = random_scene(seed)
     moved = scenes.turned(scene, pose.exp(np.random.default_rng(seed).standard_normal(6)))
-    e, J = build_contact_equations(scene.assembly, scene.start, scene.goals).linearise(scene.goals)
-    e_moved, J_moved = build_contact_equations(moved.assembly, moved.start, moved.goals).linearise(moved.goals)
+    e, J = build_contact_equations(scene.assembly, scene.start, scene.nominal_poses).linearise(scene.nominal_poses)
+    e_moved, J_moved = build_contact_equations(moved.assembly, moved.start, moved.nominal_poses).linearise(
+        moved.nominal_poses
+    )
     assert_allclose(e_moved, e, atol=1e-12)
     assert_allclose(J_moved, J, atol=1e-12)
 
@@ -117,8 +119,10 @@ def with_free(system: Equations, free: set[int] | None) -> Equations:
 )
 def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) -> None:
     scene = scenes.ALL[name]()
-    columns = range(len(scene.goals)) if free is None else free
-    e, J = with_free(build_contact_equations(scene.assembly, scene.start, scene.goals), free).linearise(scene.goals)
+    columns = range(len(scene.nominal_poses)) if free is None else free
+    e, J = with_free(build_contact_equations(scene.assembly, scene.start, scene.nominal_poses), free).linearise(
+        scene.nominal_poses
+    )
     chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
     scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
     assert [compute_least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]

@@ -34,7 +34,7 @@ WALLS_MM = 0.02
 
 def pairs(scenario: Scenario) -> Iterator[Pair]:
     assembly = scenario.assembly
-    history = compute_placements(assembly, scenario.start, scenario.goals)
+    history = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     relations = assembly.relations()
     for arc in assembly.arcs():
         made = relations[arc[0]].made
@@ -55,7 +55,7 @@ def plays(name: str) -> dict[str, float]:
 def test_the_play_between_the_walls_of_a_slot_is_the_clearance() -> None:
     """The stick between two parallel walls; its floor, with nothing above it, bounds nothing."""
     scene = CASTLES()
-    true = compute_placements(scene.assembly, scene.start, scene.goals)[-1]
+    true = compute_placements(scene.assembly, scene.start, scene.nominal_poses)[-1]
     found = [
         compute_joint_play_mm(scene.assembly, contact, 2, true, CLEARANCE_MM)
         for contact in scene.assembly.operations[2].contacts

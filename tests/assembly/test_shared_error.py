@@ -49,6 +49,6 @@ def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
         xi = pose.log(pose.inverse(seen.poses) @ shown.poses).ravel()
         joint = compute_joint_covariance(seen.poses, seen.covariance, seen.shared)
         square.append(xi @ np.linalg.solve(joint, xi))
-    freedom = 6 * len(scene.goals)
+    freedom = 6 * len(scene.nominal_poses)
     assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 600) + 0.02 * freedom)
     assert np.var(square) == pytest.approx(2 * freedom, rel=0.25)

@@ -48,7 +48,7 @@ def test_relations_are_kept_when_they_are_lost() -> None:
 def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:
     for build in scenes.ALL.values():
         scene = build()
-        goals = scenes.noisy(scene.goals, np.random.default_rng(1), 20.0, 20.0)
+        goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(1), 20.0, 20.0)
         for odls, poses in zip(
             scene.assembly.odls(), compute_placements(scene.assembly, scene.start, goals), strict=True
         ):

@@ -90,22 +90,6 @@ def test_the_doctor_names_packages_and_missing_extras(
     assert lines["rendering"] == "rendering works"
 
 
-def test_the_default_method_is_the_same_everywhere() -> None:
-    from inspect import signature
-
-    from apo_bench import CorrectPoses, SweepConfig, TrialConfig, correct
-    from apo_bench.cli.correct_command import correct_command
-    from apo_bench.cli.inspect_poses import poses_command
-    from apo_bench.cli.shared import make_trial_options
-    from apo_bench.records import CORRECTOR
-
-    commands = [signature(command).parameters["method"].default for command in (correct_command, poses_command)]
-    functions = [signature(function).parameters["corrector"].default for function in (CorrectPoses, correct)]
-    assert {*commands, *functions, TrialConfig("").method} == {CORRECTOR}
-    assert CORRECTOR in SweepConfig(("stick_in_tower",)).method
-    assert f"default: {CORRECTOR}." in make_trial_options("method")[0].annotation.__metadata__[0].help
-
-
 def test_json_is_exactly_one_record(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "run", "block_on_block", "--seed", "5", *QUICK, "--method", "paper", "--json")
     assert (code, err) == (0, "")

@@ -99,17 +99,6 @@ def test_what_happens_in_doubt(
     assert "R4 may be wrong" in run(capsys, *asked(path, "--method", method))[1]
 
 
-def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    lines = SEEN.read_text(encoding="utf-8").splitlines()
-    path = tmp_path / "missed.csv"
-    path.write_text("\n".join([f"{lines[0]},seen", *(f"{line},{i != 1}" for i, line in enumerate(lines[1:]))]))
-    code, out, err = run(capsys, *asked(path, "--method", "contact"))
-    assert (code, err, "not_seen" in out) == (1, "", True)
-    assert json.loads(run(capsys, *asked(path, "--method", "contact", "--json"))[1])["operations"] is None
-    code, out, err = run(capsys, "inspect", "dof", "stick_in_tower", "--observation", str(path))
-    assert (code, err, "x 50.00 mm" in out) == (0, "", True)
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     [

@@ -71,7 +71,7 @@ def test_offered_names_are_the_known_names() -> None:
     assert tuple(offered_names("scenario")) == list_scenario_names()
     assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
     assert [checked_method(name) for name in offered_names("method")] == offered_names("method")
-    assert [checked_contact_source(name) for name in offered_names("contact_source") if name != "shifted"]
+    assert [checked_contact_source(name) for name in offered_names("contact_source") if name != "face-offset"]
     assert set(NOISES) < set(offered_names("noise"))
     for name in offered_names("noise"):
         assert make_noise(name, NoiseLevel(1.0, 1.0))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 PROGRAM = Path(sys.executable).with_name("apo-bench")
-TRIED = ("OCP", "build123d", "cffi", "glfw", "gymnasium", "jax", "mujoco", "numba", "numpy", "pandas", "pyarrow", "ray")
+TRIED = ("OCP", "build123d", "cffi", "glfw", "gymnasium", "jax", "mujoco", "numpy", "pandas", "pyarrow", "ray")
 TRIED += ("scipy", "sitecustomize", "sksparse", "viser", "yaml")
 """Packages that dependencies try to import, installed or not."""
 SHORT = (
@@ -31,7 +31,7 @@ arm list
 part import a.step --out parts
 inspect depth block_on_block
 view block_on_block
-report run --pictures 1 --trust-code
+report run --pictures 1
 compare run run
 doctor
 """

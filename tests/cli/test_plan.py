@@ -99,12 +99,12 @@ SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "F": (
 
 
 def nominal(scenario: Scenario) -> Plan:
-    return Plan(scenario.assembly, scenario.start, scenario.goals)
+    return Plan(scenario.assembly, scenario.start, scenario.nominal_poses)
 
 
 def unstated(scenario: Scenario) -> list[tuple[str, list[str]]]:
     """States and macros found without any stated line of attach."""
-    found = understand(scenario.assembly, find_nominal_start(scenario), scenario.goals)
+    found = understand(scenario.assembly, find_nominal_start(scenario), scenario.nominal_poses)
     return [
         (
             f"{each.before.state.letter} -> {each.after.state.letter}",
@@ -145,11 +145,11 @@ def test_plans_do_not_depend_on_the_frame(name: str) -> None:
     """Turned and shifted on the table, the same macros in the same directions of the parts; also a little askew."""
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
-    straight = understand(scene.assembly, scene.start, scene.goals)
+    straight = understand(scene.assembly, scene.start, scene.nominal_poses)
     for _ in range(2):
         turn = scenes.turned(scene, pose.at(rng.uniform(-0.3, 0.3, 3) * (1, 1, 0), (0, 0, rng.uniform(-180, 180))))
-        found = understand(turn.assembly, turn.start, turn.goals)
-        askew = scenes.noisy(scene.goals, rng, 1.0, 1.0)
+        found = understand(turn.assembly, turn.start, turn.nominal_poses)
+        askew = scenes.noisy(scene.nominal_poses, rng, 1.0, 1.0)
         seen = understand(scene.assembly, scene.start, askew, angle_rad=np.radians(10.0))
         for a, b, c in zip(straight, found, seen, strict=True):
             assert a.names == b.names == c.names
@@ -196,7 +196,7 @@ def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 def test_undoing_reverses_the_macros() -> None:
     """Example 5.3: the cube goes back against castle 2, so undoing its departure is the sliding that put it there."""
     scenario = load_scenario("vanished_fixture")
-    goals = scenario.goals
+    goals = scenario.nominal_poses
     schedule = (*(Step(k) for k in range(5)), Step(4, True), Step(3, True))
     plan = Plan(scenario.assembly, scenario.start, goals, schedule)
     *_, stick, cube = plan_lines(plan, scenario)

@@ -23,7 +23,7 @@ def nominal(scenario: Scenario, sigma: float = 1.0) -> Observation:
     n = len(scenario.assembly)
     deviations = sigma * np.array([1e-3] * 3 + [np.radians(1.0)] * 3)
     covariance = np.tile(np.diag(deviations**2), (n, 1, 1))
-    return Observation(scenario.assembly, scenario.start, scenario.goals, covariance, np.ones(n, bool))
+    return Observation(scenario.assembly, scenario.start, scenario.nominal_poses, covariance, np.ones(n, bool))
 
 
 def explained(name: str) -> tuple[Observation, Explanation]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench import ContactCorrector, Correction, InputError, Observation, correct, correct_many
+from apo_bench import ContactCorrector, Correction, Observation, correct, correct_many
 from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import pose
 from tests import scenes
@@ -22,9 +22,9 @@ def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) ->
     rng = np.random.default_rng(0)
     out = []
     for i in range(count):
-        n = len(scene.goals)
+        n = len(scene.nominal_poses)
         L = crooked(n, rng, mm, deg) if i % 2 else scales(n, mm, deg)
-        seen = scenes.seen(scene, twisted(scene.goals, L, rng))
+        seen = scenes.seen(scene, twisted(scene.nominal_poses, L, rng))
         out.append(replace(seen, covariance=L @ np.swapaxes(L, 1, 2)))
     return out
 
@@ -49,23 +49,6 @@ def test_many_are_one_after_the_other(build: Callable[[], scenes.Scene]) -> None
     seen = draws(build(), 8)
     corrector = ContactCorrector()
     check_same(correct_many(seen, contact), [corrector(one) for one in seen])
-
-
-def test_other_assemblies_are_refused() -> None:
-    first, second = draws(scenes.stick_in_tower(), 2)
-    start = {**second.start, "castle1": pose.at((9.0, 0.0, 0.0))}
-    for other in (
-        draws(scenes.stick_in_tower(), 1)[0],
-        replace(second, assembly=replace(second.assembly)),
-        replace(second, start=start),
-        replace(second, play_m=1e-3),
-    ):
-        with pytest.raises(InputError) as error:
-            correct_many([first, second, other])
-        assert str(error.value) == (
-            "observation 3 is of another assembly, start or play than observation 1; "
-            "correct those together that share them."
-        )
 
 
 def test_by_default_they_are_corrected_as_one_is() -> None:

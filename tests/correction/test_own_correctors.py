@@ -17,7 +17,7 @@ from apo_bench.trial.stages import simulate_demonstration
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
-SEEN = scenes.seen(TOWER, TOWER.goals)
+SEEN = scenes.seen(TOWER, TOWER.nominal_poses)
 CODE = """
 import numpy as np
 from apo_bench.assembly.correction_record import Correction

@@ -56,4 +56,4 @@ def test_the_robot_takes_apart_what_was_wrong_and_builds_it_again(
     tried = built(scene, back_to(2, step, len(scene.scenario.assembly)), wrong_mm)
     assert (tried.result.outcome.code, tried.verdict.demonstrated.code) == ("ok", "ok")
     assert tried.verdict.success
-    assert tried.verdict.demonstrated.displaced_mm < 0.5
+    assert tried.verdict.demonstrated.placed_part_shift_mm < 0.5

@@ -25,7 +25,7 @@ import math
 import numpy as np
 from pathlib import Path
 from apo_bench.errors import InputError
-from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import IsotropicNoise
 
 def imports(assembly, shown, rng):
     import no_such_module
@@ -100,12 +100,12 @@ class Unspeakable(Exception):
     ],
 )
 def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
-    seen = scenes.seen(TOWER, TOWER.goals)
+    seen = scenes.seen(TOWER, TOWER.nominal_poses)
     rng = np.random.default_rng(0)
     with pytest.raises(InputError) as by_noise:
         observe(scenes.shown(TOWER), make_noise(_raising(error), NOISE_LEVEL), rng)
     with pytest.raises(InputError) as by_relations:
-        replace_contacts(seen, _raising(error), TOWER.goals, rng)
+        replace_contacts(seen, _raising(error), TOWER.nominal_poses, rng)
     for raised in (by_noise, by_relations):
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)

@@ -22,6 +22,17 @@ FORBIDDEN = re.compile(
     re.IGNORECASE,
 )
 """Words that the documentation of Gymnasium and mink would not use, and words that this package used before."""
+OLD_WORDS = re.compile(
+    r"\b(alike|foretold|mouths?|way in|believe[sd]?|ghosts?|drafting|nests|feels|felt)\b", re.IGNORECASE
+)
+"""Words that pages used before for: equally, predicted, hole entrance, insertion axis, estimated, overlay, probing."""
+QUESTION = re.compile(r"^#+ ((?:What|Whether|Where|Which|Who|When|How) .*)$", re.MULTILINE)
+SHEETS = ("docs/reference/noise-models.md", "docs/reference/scenarios.md")
+"""Pages of generated sheets, whose texts are those of scenario files and of noise models."""
+MOST_WORDS = 900
+"""Of a page, outside of tables, code and formulas."""
+MOST_IN_ALL = 60_000
+"""Of README and all pages, tables and code included."""
 
 
 def help_texts() -> Iterator[tuple[str, str]]:
@@ -55,10 +66,43 @@ def messages() -> Iterator[tuple[str, str]]:
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    for path in (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))):
+    for path in (DOCS.parent / "README.md", DOCS.parent / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))):
         yield str(path.relative_to(DOCS.parent)), path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("texts", [help_texts, public_docstrings, messages, pages])
 def test_texts_for_users_are_plain(texts: type[Iterator[tuple[str, str]]]) -> None:
     assert [(where, found[0]) for where, text in texts() if (found := FORBIDDEN.search(text))] == []
+
+
+def prose(text: str) -> str:
+    """Return a page without its tables, blocks of code and formulas."""
+    plain = re.sub(r"^```.*?^```$|\$\$.*?\$\$|\$[^$\n]+\$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return "\n".join(line for line in plain.splitlines() if not line.startswith("|"))
+
+
+def test_pages_do_not_use_words_of_before() -> None:
+    written = ((where, prose(text)) for where, text in pages() if where not in SHEETS)
+    assert [(where, found[0]) for where, text in written if (found := OLD_WORDS.search(text))] == []
+
+
+def test_headings_are_noun_phrases_or_imperatives() -> None:
+    assert [(where, found) for where, text in pages() for found in QUESTION.findall(prose(text))] == []
+
+
+def test_pages_are_short() -> None:
+    counts = {where: len(prose(text).split()) for where, text in pages() if where not in SHEETS}
+    assert {where: count for where, count in counts.items() if count > MOST_WORDS} == {}
+    assert sum(len(text.split()) for _, text in pages()) <= MOST_IN_ALL
+
+
+def test_guides_begin_with_what_the_reader_can_do_and_how() -> None:
+    """Before the first heading stands a sentence of what the reader has or can do, and code, a command or a table."""
+    guides = {where: text.split("\n## ")[0] for where, text in pages() if where.startswith("docs/guide/")}
+    assert len(guides) > 20
+    assert [where for where, text in guides.items() if not text.split("\n\n")[1].startswith("After this page")] == []
+    shown = re.compile(r"^(```|\|)", re.MULTILINE)
+    assert [where for where, text in guides.items() if not shown.search(text)] == [
+        "docs/guide/programs.md",
+        "docs/guide/templates.md",
+    ]

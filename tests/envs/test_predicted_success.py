@@ -32,5 +32,5 @@ def test_an_environment_that_abstains_gives_no_reward_and_moves_nothing(monkeypa
     env = CorrectPoses(APOReplay(SCENARIO, min_predicted_success=1.0))
     env.reset(seed=SEED)
     _, reward, terminated, _, info = env.step(zeros(env))
-    assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "promise", "abstained")
+    assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "predicted-success", "abstained")
     assert info["predicted_success"] < 1.0

@@ -32,7 +32,7 @@ def observation(seed: int = 0) -> Observation:
     return Observation(
         assembly=SCENARIO.assembly,
         start=SCENARIO.start,
-        poses=SCENARIO.goals @ pose.exp(rng.normal(size=(N, 6)) * np.repeat([0.1, 1.0], 3)),
+        poses=SCENARIO.nominal_poses @ pose.exp(rng.normal(size=(N, 6)) * np.repeat([0.1, 1.0], 3)),
         covariance=A @ np.swapaxes(A, 1, 2) + 1e-8 * np.eye(6),
         observed=rng.random(N) < 0.7,
         gap_m=float(rng.uniform(1e-5, 1e-3)),
@@ -99,7 +99,7 @@ def test_a_plan_states_the_poses_of_steps_that_are_not_target_poses() -> None:
 
 
 def test_files_speak_mm_degrees_and_count_from_one() -> None:
-    goals = SCENARIO.goals.copy()
+    goals = SCENARIO.nominal_poses.copy()
     goals[2, :3, 3] = [0.1, -0.2, 0.3]
     covariance = np.tile(np.diag([1e-6] * 3 + [np.radians(2.0) ** 2] * 3), (N, 1, 1))
     seen = Observation(SCENARIO.assembly, SCENARIO.start, goals, covariance, np.ones(N, dtype=bool))

@@ -1,7 +1,7 @@
 """The subset `small` of the golden data, computed again: corrections, detected contacts, ends of trials and episodes.
 
 `python -m benchmarks.golden --collect tests/golden/small.jsonl.xz --subset small` made the data. Its tolerances are for
-other processors: OpenBLAS, NumPy and Numba choose their code by what the processor can do.
+other processors: OpenBLAS and NumPy choose their code by what the processor can do.
 """
 
 from __future__ import annotations

@@ -170,12 +170,12 @@ def test_each_contact_is_judged_when_made_and_at_the_end_if_it_stands() -> None:
 
 def test_poses_that_are_not_finite_fail_without_a_crash() -> None:
     scene = scenes.turned(TOWER(), LAYOUT)
-    poses = compute_placements(scene.assembly, scene.start, scene.goals)
+    poses = compute_placements(scene.assembly, scene.start, scene.nominal_poses)
     good = [snapshot(dict(state)) for state in poses]
     broken = snapshot(dict(poses[-1]))
     object.__setattr__(broken, "poses", {**poses[-1], "stick": np.full((4, 4), np.nan)})
     for reached in (ReachedState((*good[:2], broken), broken), ReachedState(tuple(good), broken)):
-        found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM))
+        found = judge(scene.assembly, reached, scene.nominal_poses, Criteria(Thresholds(), CLEARANCE_MM))
         assert (found.success, found.as_demonstrated, found.loose_success) == (False, False, False)
         assert found.finished.code == found.demonstrated.code == "not_made"
 
@@ -186,7 +186,7 @@ THRESHOLDS = st.builds(
     fit_margin_mm=st.floats(0.0, 50.0),
     support_mm=st.floats(0.0, 50.0),
     overlap_fraction=st.floats(0.0, 1.0),
-    displaced_mm=st.floats(0.0, 50.0),
+    placed_part_shift_mm=st.floats(0.0, 50.0),
     loose_gap_mm=st.floats(0.0, 10.0),
     loose_angle_deg=st.floats(0.0, 90.0),
 )
@@ -214,16 +214,19 @@ def test_strict_implies_loose_whatever_the_thresholds(build, seed: int, scale: f
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene = TOWER()
-    goals = scenes.noisy(scene.goals, rng, 0.3, 0.3)
+    goals = scenes.noisy(scene.nominal_poses, rng, 0.3, 0.3)
     numbers = []
     for W in (np.eye(4), pose.exp(rng.standard_normal(6))):
         there = scenes.turned(scene, W)
         states = [snapshot(dict(p)) for p in compute_placements(there.assembly, there.start, W @ goals)]
         both = judge(
-            there.assembly, ReachedState(tuple(states), states[-1]), there.goals, Criteria(Thresholds(), CLEARANCE_MM)
+            there.assembly,
+            ReachedState(tuple(states), states[-1]),
+            there.nominal_poses,
+            Criteria(Thresholds(), CLEARANCE_MM),
         )
         found = (both.demonstrated, both.finished)
-        numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.displaced_mm)])
+        numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.placed_part_shift_mm)])
     assert numbers[0] == pytest.approx(numbers[1], abs=1e-6)
 
 
@@ -250,11 +253,11 @@ def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:
 
 def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
     scene = FIXTURE()
-    poses = compute_placements(scene.assembly, scene.start, scene.goals)
+    poses = compute_placements(scene.assembly, scene.start, scene.nominal_poses)
     off = [dict(state) for state in poses]
     off[2]["castle2"] = off[2]["castle2"] @ scenes.mm(0, -0.9, 0)
     reached = ReachedState(tuple(map(snapshot, off)), snapshot(dict(poses[-1])))
     for meaning, right in (("assembled", True), ("as_demonstrated", False)):
-        found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM, meaning))
+        found = judge(scene.assembly, reached, scene.nominal_poses, Criteria(Thresholds(), CLEARANCE_MM, meaning))
         assert (found.success, found.as_demonstrated) == (right, False)
         assert found.rests_on.code == ("ok" if right else "gap")

@@ -202,10 +202,3 @@ def test_a_folder_of_something_else(name: str, text: str, words: str, tmp_path: 
         write(tmp_path, range(3))
     assert words in str(refused.value)
     assert (tmp_path / name).read_bytes() == text.encode("latin-1")
-
-
-def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    for folder in (tmp_path / "file" / "run", Path("/proc/none"), Path("/sys/kernel")):
-        with pytest.raises(InputError, match="cannot be written"):
-            RunFolder(folder, run())

@@ -31,7 +31,7 @@ def load(tmp_path: Path, *changes: tuple[str, str]) -> Scenario:
 def seen(scenario: Scenario, goals: np.ndarray | None = None) -> Observation:
     n = len(scenario.assembly)
     covariance = np.tile(np.diag(np.repeat([1e-3, np.radians(1.0)], 3) ** 2), (n, 1, 1))
-    goals = scenario.goals if goals is None else goals
+    goals = scenario.nominal_poses if goals is None else goals
     play_m = 1e-3 * scenario.clearance_mm
     return Observation(scenario.assembly, scenario.start, goals, covariance, np.ones(n, dtype=np.bool_), 1e-4, play_m)
 
@@ -109,7 +109,7 @@ def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> Non
     )
     scenario = load(tmp_path, *both, *second)
     assert len(scenario.assembly.gaps) == 4
-    goals = np.array(scenario.goals)
+    goals = np.array(scenario.nominal_poses)
     goals[2, 1, 3] += 1e-3
     made = correct(seen(scenario, goals), "contact")
     assert made.ok, made.sentence

@@ -109,7 +109,7 @@ def test_what_the_tower_says():
     assert [operation.main for operation in tower.assembly.operations] == ["castle1", "castle2", "stick"]
     assert [len(operation.contacts) for operation in tower.assembly.operations] == [1, 2, 6]
     assert tower.assembly.fixed == {"table"}
-    assert tower.goals[1] == pytest.approx(pose.at((0, 0, 0.08), (180, 0, 0)))
+    assert tower.nominal_poses[1] == pytest.approx(pose.at((0, 0, 0.08), (180, 0, 0)))
     assert tower.start["castle2"] == pytest.approx(pose.at((0.14, -0.29, 0.04), (180, 0, 0)))
     assert (tower.human_error.operation, tower.human_error.low_m, tower.human_error.high_m) == (1, 0.0015, 0.004)
     assert tower.human_error.axis == pytest.approx((0, 1, 0))

@@ -82,9 +82,9 @@ def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:
     """The errors of all operations of a scene, (n, 3), where one is off; its last operation is a free one more."""
     last = replace(scene.assembly.operations[-1], contacts=())
     assembly = replace(scene.assembly, operations=(*scene.assembly.operations, last))
-    goals = np.concatenate([scene.goals, scene.goals[-1:]])
+    goals = np.concatenate([scene.nominal_poses, scene.nominal_poses[-1:]])
     human_error = HumanError(operation, np.array([1.0, 0.0, 0.0]), 0.0, 0.01)
-    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, human_error=human_error)
+    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, nominal_poses=goals, human_error=human_error)
     return spread_error(scenario, Layout(goals, scene.start), offset).offsets[:-1]
 
 
@@ -93,9 +93,9 @@ def test_a_shaft_follows_its_bore_across_the_axis_and_not_along() -> None:
     found = led(scene, 0, np.array([0.003, -0.002, 0.0]))
     assert found[1] == pytest.approx([0.003, -0.002, 0.0], abs=1e-12)
     scene = rounds.through()
-    world = scene.goals[0][:3, :3] @ np.array([0.001, 0.0, 0.004])
+    world = scene.nominal_poses[0][:3, :3] @ np.array([0.001, 0.0, 0.004])
     found = led(scene, 1, np.array([0.001, 0.0, 0.004]))
-    peg = scene.goals[2][:3, :3] @ found[2]
+    peg = scene.nominal_poses[2][:3, :3] @ found[2]
     assert peg == pytest.approx([world[0], 0.0, world[2]], abs=1e-12)
 
 

@@ -83,9 +83,9 @@ def test_scenes_of_round_and_tilted_parts_are_closed(name: str) -> None:
 
 def changed(of: Scene, operation: int, T: np.ndarray) -> Scene:
     """The goal of an operation (from 1) moved in its own frame."""
-    goals = of.goals.copy()
+    goals = of.nominal_poses.copy()
     goals[operation - 1] = goals[operation - 1] @ T
-    return replace(of, goals=goals)
+    return replace(of, nominal_poses=goals)
 
 
 def with_part(of: Scene, part: Any) -> Scene:

@@ -24,11 +24,6 @@ env.reset(seed=0)
 info = env.step(0 * env.action_space.sample())[-1]
 scene = env.unwrapped._scene
 """
-COMPOSE = """
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import build_scene
-scene = build_scene(load_scenario("block_on_block"))
-"""
 DRAW = """
 from apo_bench.errors import InputError
 from apo_bench.simulation.scene.render import draw_picture
@@ -67,18 +62,6 @@ def test_a_replay_loads_no_graphics_driver_and_a_picture_is_drawn_afterwards() -
     if "no picture can be drawn here" in drawn[0]:
         pytest.skip(drawn[0])
     assert drawn == ["(48, 64, 3)", "(48, 64, 3)", "True"]
-
-
-@linux
-@pytest.mark.parametrize("backend", [None, "disable"])
-def test_a_scene_is_composed_under_any_backend_and_a_picture_is_drawn_or_refused(backend: str | None) -> None:
-    done = python(f"{LOADED}{COMPOSE}print(loaded())\n{DRAW}", backend)
-    assert (done.returncode, done.stderr) == (0, "")
-    composed, first, second = done.stdout.splitlines()
-    assert composed == "[]"
-    assert first == second
-    refused = first.startswith("no picture can be drawn here (") and first.endswith("set MUJOCO_GL=egl.")
-    assert refused or (first == "(48, 64, 3)" and backend is None)
 
 
 @linux

@@ -1,6 +1,6 @@
 """A robot that probes: where it touches, what laying flat measures, and that it uses touches only."""
 
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,9 +9,9 @@ from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import parse_ft_noise
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.probing.places import floor_places, wall_places
+from apo_bench.simulation.execution.probing.places import floor_places
 from apo_bench.simulation.execution.probing.state import ProbingState, touch_guard
-from apo_bench.simulation.execution.probing.touching import _stand_off, probe_fixed_parts
+from apo_bench.simulation.execution.probing.touching import probe_fixed_parts
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import compute_low_pass_gain, filter_noise
@@ -61,21 +61,6 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
     for place in places:
         touched = pose.apply(place.T_world_tip, place.patch).mean(axis=0)
         assert place.normal @ touched - place.offset == pytest.approx(0.004, abs=1e-9)
-
-
-def test_a_robot_that_may_be_far_off_begins_farther_away():
-    def begins(stated):
-        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "near-contact")
-        probing = probing_config(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
-        stand_off = partial(_stand_off, robot, ProbingState(probing, plan("peg_in_hole"), scene("peg_in_hole"), None))
-        found = (places(plan("peg_in_hole"), scene("peg_in_hole"), stand_off) for places in (floor_places, wall_places))
-        return [[place.stand_off for place in each] for each in found]
-
-    assert begins(STATED) == [[0.004] * 3, [0.004] * 4]
-    floor, walls = begins("tool:5")
-    assert floor == pytest.approx([0.015] * 3)
-    assert all(place == pytest.approx(0.015) or place == 0.004 for place in walls)  # as far as there is room
-    assert len(walls) == 4
 
 
 def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():

@@ -8,7 +8,6 @@ import pytest
 
 from apo_bench import Plan, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.simulation.execution import ExecutionConfig
-from apo_bench.simulation.execution.prepare import plan_moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.search import RADIUS_M
 from apo_bench.simulation.execution.search_laws import PITCH_M, Spiral
@@ -85,17 +84,6 @@ def test_cached_beginnings_change_no_byte():
     assert (none["failure_code"], none["config_hash"]) == ("force_stop", search["config_hash"])
     assert search["sim_time_s"] > none["sim_time_s"]
     assert none["failure_prediction"] == search["failure_prediction"]
-
-
-def test_only_insertions_have_a_search():
-    plan = aside("carried_bridge", 0.0)
-    done = [move.transfer for move in plan_moves(plan, scene("carried_bridge"), spiral=True)]
-    assert [t.front is not None for t in done] == [False, False, False, True, True]
-    stick, cube = done[3:]
-    assert abs(stick.front[0]) == pytest.approx(0.11, abs=1e-3), "the end of the stick, less the clearance"
-    assert np.abs(stick.front[1:]).max() == pytest.approx(0.0, abs=1e-9)
-    assert cube.front[2] == pytest.approx(-0.025, abs=1e-3), "the bottom of the cube"
-    assert all(move.transfer.front is None for move in plan_moves(plan, scene("carried_bridge")))
 
 
 @pytest.mark.parametrize("direction", [DOWN, np.array([0.6, -0.8, 0.0])])

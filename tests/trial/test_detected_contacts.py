@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -68,23 +67,6 @@ def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
     assert found["recall"] == pytest.approx(6 / 7)
 
 
-def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = Path(SEEN).read_text(encoding="utf-8").splitlines()
-    header, first, *rest = lines
-    x = header.split(",").index("z_mm")
-    cells = first.split(",")
-    cells[x] = str(float(cells[x]) + 30.0)
-    path = tmp_path / "lifted.csv"
-    path.write_text("\n".join([header, ",".join(cells), *rest]) + "\n", encoding="utf-8")
-    assert cli.main(["detect-contacts", "stick_in_tower", "--observation", str(path), "--json"]) == 0
-    form = json.loads(capsys.readouterr().out)
-    assert form["schema"] == "apo-bench/detected-contacts/1"
-    assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
-    assert form["contacts_false_negative"] == len(form["missed"])
-    assert form["contacts_true_positive"] == sum(contact["in_scenario"] for contact in form["contacts"])
-    assert all(abs(contact["gap_mm"]) <= contact["allowed_gap_mm"] for contact in form["contacts"])
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -100,15 +82,3 @@ def test_wrong_requests_get_one_sentence(arguments: list[str], words: str, capsy
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
-
-
-def test_a_measured_observation_may_be_recognised(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = ["--method", "contact", "--contact-source", "detected", "--json"]
-    assert cli.main(["run", "stick_in_tower", "--observation", SEEN, *wanted]) == 0
-    made = json.loads(capsys.readouterr().out)
-    assert (made["success"], made["noise"], made["contact_source"]) == (True, "measured", "detected")
-    assert (made["contacts_true_positive"], made["contacts_false_negative"], made["contacts_false_positive"]) == (
-        9,
-        0,
-        0,
-    )

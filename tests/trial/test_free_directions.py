@@ -15,14 +15,18 @@ from tests import scenes
 
 
 def is_uncorrected(scene: scenes.Scene) -> Observation:
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     return Observation(
-        scene.assembly, scene.start, scene.goals, np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)), np.ones(n, bool)
+        scene.assembly,
+        scene.start,
+        scene.nominal_poses,
+        np.tile(np.diag([1e-6] * 3 + [3e-4] * 3), (n, 1, 1)),
+        np.ones(n, bool),
     )
 
 
 def space_of(scene: scenes.Scene) -> FreeSpace:
-    found = free_space(is_uncorrected(scene), scene.goals)
+    found = free_space(is_uncorrected(scene), scene.nominal_poses)
     assert found is not None
     return found
 
@@ -48,7 +52,7 @@ def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     space = space_of(scene)
-    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.goals, atol=1e-15)
+    np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.nominal_poses, atol=1e-15)
     for _ in range(3):
         s = 3.0 * rng.normal(size=len(space))
         goals = space.place(s)
@@ -61,10 +65,10 @@ def test_where_linearising_leads_nowhere_even_points_are_tried_and_the_way_back_
     space = space_of(scenes.stick_in_tower())
 
     def flat(goals: Array) -> Array:
-        far = 1e3 * np.abs(goals - space.goals)[:, :3, 3].max()
+        far = 1e3 * np.abs(goals - space.poses)[:, :3, 3].max()
         return np.array([1.0 if far < 1.0 else -1.0])
 
     found = nearest_fitting(space, lambda goals: True, flat)
     assert found is not None
-    assert 1.0 <= 1e3 * np.abs(found - space.goals)[:, :3, 3].max() < 1.5
+    assert 1.0 <= 1e3 * np.abs(found - space.poses)[:, :3, 3].max() < 1.5
     assert nearest_fitting(space, lambda goals: False, flat) is None

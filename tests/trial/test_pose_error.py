@@ -28,10 +28,10 @@ def reached(scene: scenes.Scene, goals: Array) -> ReachedState:
 
 def errors(scene: scenes.Scene, wrong: Mapping[int, Array]) -> tuple[float | None, float | None]:
     """The errors if operations (from 1) end displaced, in the frames of their parts."""
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     for k, T in wrong.items():
         goals[k - 1] = goals[k - 1] @ T
-    return pose_errors(scene.assembly, scene.start, scene.goals, reached(scene, goals))
+    return pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
 
 
 FIXED_AND_FREE = [
@@ -56,12 +56,14 @@ def test_the_two_parts_add_up_and_no_frame_matters(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene = scenes.stick_in_tower()
     xi = rng.standard_normal((3, 6)) * np.repeat([2e-3, 0.02], 3)
-    goals = scene.goals @ pose.exp(xi)
-    fixed, free = pose_errors(scene.assembly, scene.start, scene.goals, reached(scene, goals))
+    goals = scene.nominal_poses @ pose.exp(xi)
+    fixed, free = pose_errors(scene.assembly, scene.start, scene.nominal_poses, reached(scene, goals))
     assert fixed is not None
     assert free is not None
     scaled = xi * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed**2 + free**2 == pytest.approx((scaled**2).sum() / 3)
     moved = scenes.turned(scene, pose.exp(rng.standard_normal(6)))
-    there = reached(moved, moved.goals @ pose.exp(xi))
-    assert pose_errors(moved.assembly, moved.start, moved.goals, there) == pytest.approx((fixed, free), abs=1e-6)
+    there = reached(moved, moved.nominal_poses @ pose.exp(xi))
+    assert pose_errors(moved.assembly, moved.start, moved.nominal_poses, there) == pytest.approx(
+        (fixed, free), abs=1e-6
+    )

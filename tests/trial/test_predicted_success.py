@@ -138,6 +138,6 @@ def test_below_abstain_the_arm_never_moves(
     least = min(1.0, carried_out["predicted_success"] + 1e-6)
     monkeypatch.setattr(run, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
     kept = row(scene, simulated, min_predicted_success=least)
-    assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
+    assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "predicted-success", "abstained")
     assert (kept["sim_time_s"], kept["reached"]) == (None, None)
     assert kept["predicted_success"] == carried_out["predicted_success"]

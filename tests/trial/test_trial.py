@@ -60,7 +60,7 @@ def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) ->
         assert list(row) == keys
         assert json.loads(json.dumps(row, allow_nan=False)) == row
         assert (row["schema"], row["env_id"]) == (RECORD_SCHEMA, ENV_ID)
-        assert row["thresholds"]["displaced_mm"] == 1.0
+        assert row["thresholds"]["placed_part_shift_mm"] == 1.0
         assert row["demonstration"] == "ok"
 
 
@@ -121,13 +121,13 @@ def test_wrong_relations_are_told_and_noted(
     scene: Scene, shown: SimulatedDemonstration, rows: dict[str, dict[str, Any]]
 ) -> None:
     """Correctors meet them, nothing else does; robot and judge keep the right ones."""
-    kinds = ("false-negative", "false-positive", "shifted:3")
+    kinds = ("false-negative", "false-positive", "face-offset:3mm")
     told = {k: run_trial(replace(SPEC, method="paper", contact_source=k), scene, simulated=shown) for k in kinds}
     assert [told[k]["contact_source"] for k in kinds] == list(kinds)
     assert [told[k]["wrong_contact"] is None for k in kinds] == [True, False, False]
     assert rows["paper"]["wrong_contact"] is None
-    assert told["shifted:3"]["success"] is False
-    raw = [rows["uncorrected"], run_trial(replace(SPEC, contact_source="shifted:3"), scene, simulated=shown)]
+    assert told["face-offset:3mm"]["success"] is False
+    raw = [rows["uncorrected"], run_trial(replace(SPEC, contact_source="face-offset:3mm"), scene, simulated=shown)]
     apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
     assert apart == {"contact_source", "config_hash"}
 
@@ -155,7 +155,7 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     arm.write_text("<mujoco/>")
     part = tmp_path / "castle.xml"
     part.write_bytes(scenario.part_files["castle1"].read_bytes() + b"\n")
-    stricter = replace(scenario, thresholds=replace(scenario.thresholds, displaced_mm=0.5))
+    stricter = replace(scenario, thresholds=replace(scenario.thresholds, placed_part_shift_mm=0.5))
     wider = replace(scenario, clearance_mm=0.5)
     hashes = {
         first,

@@ -27,7 +27,7 @@ from apo_bench.viz.trial_again import repeat_trial
 def with_target_poses(scene: Scene) -> Rollout:
     """What the tower asks for, as if it had been seen 1 cm aside."""
     rollout = scenario_story(scene)
-    true = scene.scenario.goals
+    true = scene.scenario.nominal_poses
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
     return Rollout(scene, rollout.segments, rollout.assembled, {AS_SEEN: aside, AS_TRUE: true})
@@ -158,7 +158,7 @@ def test_a_trial_of_a_sweep_is_run_again(tmp_path: Path) -> None:
     assert {name: again[name] for name in ("success", "worst_gap_mm")} == {
         name: row[name] for name in ("success", "worst_gap_mm")
     }
-    assert set(rollout.goals) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
+    assert set(rollout.poses) == {AS_SEEN, AS_CORRECTED, AS_TRUE}
     reached = read_part_poses(rollout.segments[1], rollout.segments[1].moments[-1])
     assert row["reached"] is not None
     for part, packed in row["reached"].items():
@@ -201,6 +201,8 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
     def click(label: str) -> None:
         happen(next(on for group, on in zip(groups, clicked, strict=True) if label in group.args[1]), label)
 
+    assert cursor.place == len(cursor.places) - 1  # the outcome
+    cursor.go(0)
     for label, place in (("moment on", 1), ("moment on", 2), ("moment back", 1), ("operation on", 2)):
         click(label)
         page.draw()

@@ -31,7 +31,7 @@ def evidence_of(contact: Contact, made: int = 0) -> Evidence:
 
 def tower() -> Observation:
     scene = scenes.stick_in_tower()
-    return scenes.seen(scene, scene.goals)
+    return scenes.seen(scene, scene.nominal_poses)
 
 
 def table_lines(table: object) -> list[list[str]]:

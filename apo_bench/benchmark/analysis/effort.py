@@ -19,7 +19,7 @@ def tabulate_effort(records: Records) -> list[Line]:
             "trials": len(own),
             "extra_steps": float(own.number("extra_steps").mean()),
             "sim_time_s": float(np.median(own.number("sim_time_s"))),
-            "displaced_mm": float(np.nan_to_num(own.number("displaced_mm")).max()),
+            "placed_part_shift_mm": float(np.nan_to_num(own.number("placed_part_shift_mm")).max()),
         }
         for (scenario, method), own in by_method(right).items()
     ]

@@ -17,7 +17,7 @@ from apo_bench.records.run.trials import Mask, Trials, trials_of
 CONFIDENCE = 0.95
 Records = Trials | Iterable[Mapping[str, Any]]
 """Trials as columns, or as records."""
-NOT_EXECUTED = ("observe", "correct", "promise", "plan", "worker")
+NOT_EXECUTED = ("observe", "correct", "predicted-success", "plan", "worker")
 """Stages of failures at which no plan was carried out to its end: there was none, it promised too little, it was
 refused before anything moved, or its process died."""
 

@@ -61,7 +61,7 @@ _BY_PART = frozenset(
 class Seen(NamedTuple):
     """What was seen of many demonstrations."""
 
-    goals: Array
+    poses: Array
     """(n, k, 4, 4)."""
     covariance: Array
     """(n, k, 6, 6)."""
@@ -83,15 +83,15 @@ def observe_many(
         shown: Where every part was put.
         careless: (k, 6, 6), as in a `Demonstration`.
     """
-    n, k = shown.goals.shape[:2]
+    n, k = shown.poses.shape[:2]
     if by_part(noise):
         start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
         long = Demonstration(
-            _repeated(assembly, n), start, shown.goals.reshape(-1, 4, 4), {}, np.tile(human_error_scale, (n, 1, 1))
+            _repeated(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error_scale, (n, 1, 1))
         )
         return _stacked([noise(long.assembly, long, rng)], n, k)
     each = []
-    for i, goals in enumerate(shown.goals):
+    for i, goals in enumerate(shown.poses):
         one = Demonstration(
             assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, human_error_scale
         )
@@ -144,7 +144,7 @@ class Pairs:
     and `seen` is False.
     """
 
-    goals: Array
+    poses: Array
     """(n, k, 4, 4): seen, world frame, [m]."""
     covariance: Array
     """(n, k, 6, 6): stated, of the body twist by which each goal is wrong, [m, rad]."""
@@ -238,12 +238,12 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
     for i, scenario in enumerate(scenarios):
         rng = seed_block(seed, scenario.name, number)
         layouts = draw_layouts(scenario, rng, BLOCK)
-        shown = Layouts(layouts.goals @ _mistakes(scenario, human_error_scale, rng), layouts.start)
+        shown = Layouts(layouts.poses @ _mistakes(scenario, human_error_scale, rng), layouts.start)
         seen = observe_many(
             scenario.assembly, shown, compute_human_error_covariance(scenario, human_error_scale), noise, rng
         )
         rows = slice(i, None, m), slice(len(scenario.assembly))
-        truth[rows] = layouts.goals
+        truth[rows] = layouts.poses
         goals[rows], covariance[rows], there[rows] = seen
     sizes = np.array([len(scenario.assembly) for scenario in scenarios])
     turn = np.tile(np.arange(m), BLOCK)
@@ -261,7 +261,7 @@ def _mistakes(scenario: Scenario, human_error_scale: float, rng: np.random.Gener
     twists = np.zeros((BLOCK, len(scenario.assembly), 6))
     if (how := scenario.human_error) is not None:
         # how an error spreads is the same in every layout, and in proportion to it
-        way = spread_error(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
+        way = spread_error(scenario, Layout(scenario.nominal_poses, scenario.start), how.axis).offsets
         size = human_error_scale * rng.choice([-1.0, 1.0], BLOCK) * rng.uniform(how.low_m, how.high_m, BLOCK)
         twists[..., :3] = size[:, None, None] * way
     return pose.exp(twists)

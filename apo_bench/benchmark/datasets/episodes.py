@@ -42,11 +42,11 @@ OF_EPISODE: Mapping[str, str] = MappingProxyType(
         **_OF_ROW,
         "parts": "names of the parts that can move, in the order of the frames",
         "main_parts": "the part that each of the n operations moves",
-        "seen_goals": f"7 n numbers: where each part was seen after its operation, {_POSES}",
+        "observed_poses": f"7 n numbers: where each part was seen after its operation, {_POSES}",
         "covariance": "36 n numbers: of the twist by which each seen goal may be wrong, frame of the part, m and rad",
         "seen": "n: whether the operation was seen at all",
-        "true_goals": f"7 n numbers: the goals at which all contacts hold, {_POSES}",
-        "planned_goals": f"7 n numbers: where the plan puts each part in the end, {_POSES}; null without a plan",
+        "true_poses": f"7 n numbers: the goals at which all contacts hold, {_POSES}",
+        "planned_poses": f"7 n numbers: where the plan puts each part in the end, {_POSES}; null without a plan",
         "schedule": "what the plan does: k for operation k, -k where it undoes it, from 1",
     }
 )
@@ -55,7 +55,7 @@ KINDS = MappingProxyType(
     {
         **dict.fromkeys(("failure_stage", "failure_code"), "text"),
         "failure_operation": "whole",
-        "planned_goals": "numbers",
+        "planned_poses": "numbers",
         "schedule": "wholes",
     }
 )
@@ -276,11 +276,11 @@ def _episode(
         **{name: row.get(name) for name in _OF_ROW},
         "parts": recorder.parts,
         "main_parts": [operation.main for operation in seen.assembly.operations],
-        "seen_goals": _flat(seen.poses),
+        "observed_poses": _flat(seen.poses),
         "covariance": seen.covariance.ravel().tolist(),
         "seen": seen.observed.tolist(),
-        "true_goals": _flat(simulated.layout.poses),
-        "planned_goals": None if plan is None else _flat(plan.target_poses),
+        "true_poses": _flat(simulated.layout.poses),
+        "planned_poses": None if plan is None else _flat(plan.target_poses),
         "schedule": None if plan is None else [-(k + 1) if undo else k + 1 for k, undo in plan.schedule],
     }
 

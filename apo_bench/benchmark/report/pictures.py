@@ -2,8 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial, reduce
-from operator import or_
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -12,10 +11,9 @@ import numpy as np
 from apo_bench.benchmark.analysis import Condition, Records, get_condition, make_sort_key
 from apo_bench.benchmark.analysis.condition import by_method
 from apo_bench.benchmark.analysis.rates import was_executed
-from apo_bench.records import SecretSeed, TrialRecord
-from apo_bench.records.own_code import DATA_PREFIXES, describe_own_code, is_own_code
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.replay_command import Files
-from apo_bench.records.run.trials import Mask, Trials, trials_of
+from apo_bench.records.run.trials import Trials, trials_of
 
 
 class FailurePicture(NamedTuple):
@@ -27,56 +25,24 @@ class FailurePicture(NamedTuple):
     """How it was made."""
 
 
-Draw = Callable[..., tuple[list[FailurePicture], list[str]]]
-"""Runs failed trials again and draws them, as `failure_pictures` of `apo_bench.viz` does; the sentences say what could
-not be drawn."""
+Draw = Callable[[Sequence[TrialRecord], Path, Files], tuple[list[FailurePicture], list[str]]]
+"""Draws failed trials, as `failure_pictures` of `apo_bench.viz` does; the sentences say what could not be drawn."""
 
 
-class Pictures(NamedTuple):
-    """How a report gets pictures of failures."""
-
-    most: int = 0
-    draw: Draw | None = None
-    secret_seed: SecretSeed | None = None
-    trust_code: bool = False
-    """Run also trials that name code that does not come with the package."""
-
-
-def draw_failures(trials: Trials, folder: Path, files: Files, how: Pictures) -> tuple[list[FailurePicture], list[str]]:
-    """So many pictures at most, and sentences on those that are missing."""
-    if not how.most or how.draw is None:
-        return [], []
-    chosen = sample(trials, how.most, trust_code=how.trust_code)
-    pictures, missing = how.draw(chosen, folder, files, how.secret_seed, trust_code=how.trust_code)
-    without = "" if how.trust_code else describe_own_code(trials.where(_names_code(trials)).rows())
-    return pictures, [*missing, *([without] if without else [])]
-
-
-def sample(records: Records, most: int, *, trust_code: bool = False) -> list[TrialRecord]:
+def sample(records: Records, most: int) -> list[TrialRecord]:
     """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
 
-    The same trials, in any order, give the same sample. Those that were not carried out have nothing to be seen.
-
-    Args:
-        trust_code: Also trials that name code of somebody's own.
+    The same trials, in any order, give the same sample. Those that were not executed have nothing to show.
     """
     trials = trials_of(records)
     failed = (trials.number("success") == 0) & (trials.number("sim_time_s") > 0) & was_executed(trials)
     failed &= ~np.isnan(trials.number("noise_mm"))
-    if not trust_code:
-        failed &= ~_names_code(trials)
     ways = trials.where(failed).parts(("failure_stage", "failure_code"))
     chosen: list[TrialRecord] = []
     for way in sorted(ways, key=lambda way: (-len(ways[way]), way))[:most]:
         shown = Counter(x for row in chosen for x in (row["method"], row["scenario"]))
         chosen.append(min(_first(ways[way]), key=partial(_order, shown)))
     return chosen
-
-
-def _names_code(trials: Trials) -> Mask:
-    """(n,) whether a trial names code of somebody's own."""
-    named = (trials.holds(column, partial(is_own_code, column)) for column in DATA_PREFIXES)
-    return reduce(or_, named)
 
 
 def _first(trials: Trials) -> Sequence[TrialRecord]:

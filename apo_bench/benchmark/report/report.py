@@ -23,7 +23,7 @@ from apo_bench.benchmark.analysis import (
 from apo_bench.benchmark.report.answer import answer
 from apo_bench.benchmark.report.figures.figures import figures
 from apo_bench.benchmark.report.page.report_page import Contents, report_page
-from apo_bench.benchmark.report.pictures import Draw, Pictures, draw_failures
+from apo_bench.benchmark.report.pictures import Draw, sample
 from apo_bench.benchmark.report.tables.conditions import condition_table, half_table, pair_table
 from apo_bench.benchmark.report.tables.methods import (
     calibration_table,
@@ -37,7 +37,7 @@ from apo_bench.benchmark.report.tables.methods import (
 )
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, has_parquet, write_columns, write_file
-from apo_bench.records import check_same_secret_seed, read_secret_seed
+from apo_bench.records import TrialRecord
 from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
 
@@ -73,32 +73,19 @@ class Report(NamedTuple):
     """Why others were not."""
 
 
-def report(
-    folder: str | Path,
-    pictures: int = 0,
-    secret_seed_file: str | Path | None = None,
-    *,
-    trust_code: bool = False,
-    draw: Draw | None = None,
-) -> Report:
-    """Write the page, tables and figures into the folder of a sweep.
+def report(folder: str | Path, pictures: int = 0, draw: Draw | None = None) -> Report:
+    """Write the page, tables and figures into the folder of a sweep; nothing that it names is imported.
 
     Args:
-        pictures: At most this many failures are drawn; most of these trials run again.
-        secret_seed_file: Of trials drawn with a secret seed; without it none of them runs again.
-        trust_code: Run also trials that name code that does not come with the package. Without it nothing that a file
-            of the folder names is imported.
+        pictures: At most this many failures are drawn.
         draw: Draws failures; without it there is no picture.
 
     Raises:
-        InputError: No records there, another secret seed, or the folder cannot be written.
+        InputError: No records there, or the folder cannot be written.
     """
     folder = Path(folder)
     trials = read_trials(folder)
     require(len(trials), f"'{folder}' holds no finished trial yet; run the sweep before its report.")
-    secret_seed = None if secret_seed_file is None else read_secret_seed(secret_seed_file)
-    if secret_seed is not None:
-        check_same_secret_seed(f"'{folder}'", secret_seed.hash, trials.find_secret_seed())
     numbers = summarise(trials)
     require(
         numbers.results,
@@ -109,12 +96,14 @@ def report(
         for name in (TABLES, FIGURES):
             require(not (folder / name).is_symlink(), f"{folder / name} is a symbolic link; remove it.")
             (folder / name).mkdir(exist_ok=True)
-        return _write(folder, trials, numbers, Pictures(pictures, draw, secret_seed, trust_code))
+        return _write(folder, trials, numbers, sample(trials, pictures), draw)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Report:
+def _write(
+    folder: Path, trials: Trials, numbers: Summary, failures: Sequence[TrialRecord], draw: Draw | None
+) -> Report:
     run = read_run(folder)
     timing = read_timing(folder)
     tables = {
@@ -140,7 +129,7 @@ def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Rep
     paths = [figure.write(folder / FIGURES / f"{name}.svg") for name, figure in drawn.items()]
     small = [name for name in PNG if name in drawn and drawn[name].panels <= MOST_PANELS]
     paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
-    pictures, no_pictures = draw_failures(trials, folder, scenario_files(run), how)
+    pictures, no_pictures = draw(failures, folder, scenario_files(run)) if draw else ([], [])
     sentences = answer(trials, numbers.half_levels)
     html = report_page(
         Contents(

@@ -10,7 +10,7 @@ NUMBERS: Mapping[str, str] = {
     "worst_angle_deg": "angle reached [deg]",
     "least_overlap": "least overlap",
     "penetration_mm": "penetration [mm]",
-    "displaced_mm": "pushed [mm]",
+    "placed_part_shift_mm": "pushed [mm]",
     "planned_error_fixed_mm": "planned error, fixed [mm]",
     "planned_error_free_mm": "planned error, free [mm]",
     "pose_error_fixed_mm": "reached error, fixed [mm]",

@@ -71,7 +71,7 @@ def judge_row(row: CsvRow, criteria: Criteria) -> str:
         fit_mm <= criteria.clearance_mm + limits.fit_margin_mm
         and support_mm <= limits.support_mm
         and overlap_percent >= 100.0 * limits.overlap_fraction
-        and slid_mm <= limits.displaced_mm
+        and slid_mm <= limits.placed_part_shift_mm
     )
     return RIGHT if holds else WRONG
 

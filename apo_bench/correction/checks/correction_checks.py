@@ -16,29 +16,45 @@ _ASYMMETRY = 1e-9
 """How far a covariance may be from symmetric, as a part of its largest entry."""
 
 
-def check_observation(observation: Observation, called: str = "the observation") -> None:
+def check_observation(observation: Observation) -> None:
     """Refuse an observation that no corrector can make sense of.
 
     Raises:
         InputError: A pose is not rigid or absurdly far away, a part has no start, a covariance is not symmetric, or a
             length makes no sense.
     """
-    gap_m = observation.gap_m
-    play_m = observation.play_m
-    start = observation.start
-    require(0.0 < gap_m < inf, f"{called} states gap_m={gap_m!r}; give a finite length above 0, in metres.")
-    require(0.0 <= play_m < inf, f"{called} states play_m={play_m!r}; give a finite length of 0 or more, in metres.")
-    for part in observation.assembly.solids:
-        require(part in start, f"{called} has no start of the part '{part}'; state where every part starts.")
-    names = [f"the start of '{part}' in {called}" for part in start]
-    names += [f"the pose of operation {k + 1} in {called}" for k in range(len(observation.poses))]
-    check_poses(np.array([*start.values(), *observation.poses]).reshape(-1, 4, 4), names)
-    C = observation.covariance
+    check_observations((observation,), ("the observation",))
+
+
+def check_observations(observations: Sequence[Observation], names: Sequence[str]) -> None:
+    """Refuse the same of several observations, which have these names.
+
+    Raises:
+        InputError: As of one, with the name of the observation.
+    """
+    poses = list[Array]()
+    pose_names = list[str]()
+    operations = list[str]()
+    for observation, called in zip(observations, names, strict=True):
+        gap_m = observation.gap_m
+        play_m = observation.play_m
+        start = observation.start
+        require(0.0 < gap_m < inf, f"{called} states gap_m={gap_m!r}; give a finite length above 0, in metres.")
+        require(
+            0.0 <= play_m < inf, f"{called} states play_m={play_m!r}; give a finite length of 0 or more, in metres."
+        )
+        for part in observation.assembly.solids:
+            require(part in start, f"{called} has no start of the part '{part}'; state where every part starts.")
+        own = [f"operation {k + 1} in {called}" for k in range(len(observation.poses))]
+        poses += [*start.values(), *observation.poses]
+        pose_names += [f"the start of '{part}' in {called}" for part in start]
+        pose_names += [f"the pose of {operation}" for operation in own]
+        operations += own
+    check_poses(np.array(poses).reshape(-1, 4, 4), pose_names)
+    C = np.concatenate([observation.covariance for observation in observations])
     off = np.abs(C - np.swapaxes(C, 1, 2)).max(axis=(1, 2), initial=0.0)
     for k in np.flatnonzero(off > _ASYMMETRY * np.abs(C).max(axis=(1, 2), initial=0.0)):
-        raise InputError(
-            f"the covariance of operation {k + 1} in {called} is not symmetric; entry (i, j) must equal entry (j, i)."
-        )
+        raise InputError(f"the covariance of {operations[k]} is not symmetric; entry (i, j) must equal entry (j, i).")
 
 
 def check_poses(T: Array, names: Sequence[str]) -> None:

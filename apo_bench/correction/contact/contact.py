@@ -59,8 +59,6 @@ class ContactCorrector:
     """The test fails if the p-value is below this; it is the share of false alarms."""
     elsewhere: bool = True
     """Whether to try other starts where the observed poses lead to no solution, or to a distant one."""
-    compiled: bool = True
-    """Whether to use the kernels of the extra `fast`: the same poses up to rounding."""
 
     def __post_init__(self) -> None:
         require(
@@ -105,14 +103,14 @@ class ContactCorrector:
     @check_arguments
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
-        problem = problem_of((observation,), self.level, self.compiled)
+        problem = problem_of((observation,), self.level)
         solved = solve(problem, problem.without(dropped))[0]
         (before_m,) = problem.seen_gap_m()
         return check_facing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
     def _correct(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
-        problem = problem_of(observations, self.level, self.compiled)
+        problem = problem_of(observations, self.level)
         corrections = []
         for i, (before_m, solved) in enumerate(
             zip(problem.seen_gap_m(), solve(problem, problem.all_contacts), strict=True)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Observation, build_contact_equations, find_contact_pattern
 from apo_bench.correction.checks.chi_square import TEST_LEVEL, fit_deviation
 from apo_bench.correction.solvers import (
+    LARGEST_DENSE,
     CompactEquations,
     Inequalities,
-    Kernels,
     NearestPoses,
     ProjectedContacts,
     bound_contacts,
@@ -29,7 +29,6 @@ from apo_bench.correction.solvers import (
     solve_batch,
     whiten_poses,
 )
-from apo_bench.correction.solvers.kernels import kernels
 from apo_bench.geometry import Array, remember
 
 
@@ -68,7 +67,6 @@ class Problem:
     """Those of each observation; none if every contact is an equation."""
     level: float
     """The test fails if the p-value is below."""
-    kernels: Kernels | None
     begin: Array | None = None
     """(b, 6 n): the correction that is begun with, in standard deviations; None stands for no correction."""
 
@@ -139,17 +137,31 @@ class Problem:
 
     def nearest(self, chosen: NDArray[np.bool_], soft_m: Array | None = None) -> NearestPoses:
         """The nearest poses by some of the equations, demanded or given a standard deviation each, [m]."""
-        return solve_batch(self.among(chosen), self.poses, self.L, soft_m, self.begin, self.kernels)
+        return solve_batch(self.among(chosen), self.poses, self.L, soft_m, self.begin)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether matrices are small, contacts equations without play, and errors Gaussian, of each operation alone."""
+        demands = self.demands
+        gaussian = self.observation.tails is None and not self.observation.shared
+        equations = demands.all_exact and demands.slack_m is None and demands.play_covariance is None
+        return gaussian and equations and 6 * self.laid.system.n <= LARGEST_DENSE
+
+    def nearest_by_each(self, choices: NDArray[np.bool_]) -> NearestPoses:
+        """The nearest poses of one observation by each of the choices of contacts, (k, c), as a batch of k."""
+        k = len(choices)
+        # The points of a contact that is left out are zero, and so are its equations.
+        system = replace(self.laid.system, points=self.laid.system.points[:1] * choices[:, :, None, None])
+        begin = None if self.begin is None else np.tile(self.begin[:1], (k, 1))
+        poses, L = (np.tile(x[:1], (k, *[1] * (x.ndim - 1))) for x in (self.poses, self.L))
+        return solve_batch(system, poses, L, None, begin)
 
 
-def problem_of(
-    observations: Sequence[Observation], level: float = TEST_LEVEL, compiled: bool = False, at: Array | None = None
-) -> Problem:
+def problem_of(observations: Sequence[Observation], level: float = TEST_LEVEL, at: Array | None = None) -> Problem:
     """What observations of one assembly with flat faces ask, with the same start poses and play.
 
     Args:
         level: The test fails if the p-value is below.
-        compiled: Whether kernels are used where Numba is installed.
         at: Poses, (b, n, 4, 4), at which vertices are laid onto the other face of their contact and which the solver
             begins with; None stands for those that were observed.
 
@@ -162,7 +174,6 @@ def problem_of(
     poses = np.concatenate([observation.poses for observation in observations]).reshape(len(observations), -1, 4, 4)
     start = np.concatenate([np.zeros((0, 4)), *(first.start[part] for part in assembly.solids)]).reshape(-1, 4, 4)
     demands = _demands(assembly, first.play_m)
-    by = kernels() if compiled else None
     there = poses if at is None else at
     laid = project_vertices(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
@@ -173,7 +184,7 @@ def problem_of(
     begin = (
         None if at is None else np.array([whiten_poses(*observation) for observation in zip(poses, L, at, strict=True)])
     )
-    return Problem(tuple(observations), poses, L, laid, demands, inequalities, level, by, begin)
+    return Problem(tuple(observations), poses, L, laid, demands, inequalities, level, begin)
 
 
 @remember

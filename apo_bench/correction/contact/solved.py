@@ -13,6 +13,7 @@ from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.contact.squared_length import chi_square_test, chi_squares, relaxed_chi_square
 from apo_bench.correction.solvers import (
     NearestPoses,
+    compute_jacobian_rank,
     compute_marginals,
     compute_projections,
     count_active_directions,
@@ -76,8 +77,19 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
     ]
 
 
-def run_test(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
-    """The test of one observation."""
+def run_tests(problem: Problem, choices: NDArray[np.bool_]) -> list[Consistency]:
+    """The test of one observation by each of the choices of contacts, (k, c)."""
+    tests: list[Consistency | None] = [None] * len(choices)
+    if problem.is_plain and len(choices):
+        nearest = problem.nearest_by_each(choices)
+        chi_square, simple = chi_squares(problem, problem.all_contacts, nearest)
+        for i in np.flatnonzero(simple):
+            rank = compute_jacobian_rank(nearest.Jt[i])
+            tests[i] = Consistency(float(chi_square[i]), rank, p_value(chi_square[i], rank), problem.level)
+    return [test or _run_test(problem, kept) for test, kept in zip(tests, choices, strict=True)]
+
+
+def _run_test(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
     if not problem.demands.exact[kept].all():
         return solve(problem, kept)[0].test
     nearest = problem.nearest(kept)

@@ -85,7 +85,7 @@ def _is_flush(problem: Problem, solved: Solved) -> bool:
 
 def _begun_at(problem: Problem, poses: Array) -> Problem:
     """The same, begun with poses, (n, 4, 4), and vertices laid there."""
-    return problem_of(problem.observations, problem.level, problem.kernels is not None, poses[None])
+    return problem_of(problem.observations, problem.level, poses[None])
 
 
 def _starts(problem: Problem, first: Solved) -> Array:
@@ -129,7 +129,7 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     z = whiten_poses(observation.poses, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.poses, starts.shape)
-        results = [find_nearest_poses(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
+        results = [find_nearest_poses(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z)]
     else:
         result = (system.only(i) for i in range(b))
         results = [find_nearest_poses(part, observation.poses, L, None, at) for part, at in zip(result, z, strict=True)]

@@ -10,13 +10,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import (
-    Assembly,
-    Contact,
-    Suspect,
-)
+from apo_bench.assembly import Assembly, Contact, Suspect
 from apo_bench.correction.contact.problem import Problem
-from apo_bench.correction.contact.solved import pull, run_test
+from apo_bench.correction.contact.solved import pull, run_tests
 
 MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
@@ -57,10 +53,10 @@ def _rank(
     """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
     relations = problem.observation.assembly.relations()
     ranked = list[Suspect]()
-    for name, group in groups:
-        rest = kept.copy()
-        rest[list(group)] = False
-        test = run_test(problem, rest)
+    rest = np.tile(kept, (len(groups), 1))
+    for row, (_, group) in zip(rest, groups, strict=True):
+        row[list(group)] = False
+    for (name, group), test in zip(groups, run_tests(problem, rest), strict=True):
         contacts = tuple(dict.fromkeys(problem.observation.assembly.given(relations[j].contact) for j in group))
         numbers = test.chi_square, test.freedom, test.p_value
         ranked.append(Suspect(name, contacts, relations[group[0]].made, *numbers))

@@ -16,7 +16,6 @@ from apo_bench.correction.solvers.inequalities import (
     find_nearest_between,
     list_contact_demands,
 )
-from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.newton import (
     LENGTH_M,
     REST_M,
@@ -58,7 +57,6 @@ __all__ = (
     "CompactEquations",
     "Freedom",
     "Inequalities",
-    "Kernels",
     "NearestPoses",
     "ProjectedContacts",
     "Solution",

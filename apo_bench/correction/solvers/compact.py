@@ -12,16 +12,16 @@ Every array may have leading axes: many observations of one assembly are lineari
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, final
+from functools import cached_property
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Equations
-from apo_bench.correction.solvers.word_products import Words
+from apo_bench.correction.solvers.word_products import Words, words_of
 from apo_bench.geometry import GENERATORS, Array
 
-_GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
 _LEAST_PIVOT = 1e-15
 _LEAST_SQUARE = 1e-300
 """Pivots of vertices on a line, as part of the mean square of their ways, and of vertices that coincide."""
@@ -64,67 +64,58 @@ class CompactEquations:
 
     def residual(self, T: Array) -> Array:
         """e of every equation, (*, 3 c), at the poses T, (*, n, 4, 4), [m]."""
-        e = self._behind(self.words.factors(self.constants, T))[..., 0, :, :, :] @ self.plane[:, :, None]
-        return np.asarray(e.reshape(*e.shape[:-3], 3 * len(self)))
+        e = self.points @ self._reached(self.words.prefixes(self.constants, T))[..., 6:]
+        return np.asarray(e.reshape(*T.shape[:-3], 3 * len(self)))
 
-    def blocks(self, T: Array, B: Array) -> tuple[Array, Array]:
-        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's pose, (*, c, w, 6, 3).
+    def linearise(self, T: Array, B: Array | None) -> Linearised:
+        """Linearise every equation at the poses T, (*, n, 4, 4): df/dq of Eq. 10.
 
-        It is df/dq of Eq. 10, by the derivatives of the paper's appendix, which hold at dq = 0.
-
-        A letter T in n .. T .. v turns n (everything up to T) = f and (everything behind T) v = p, and a unit twist G
-        changes e by f G p; T^-1 stays on the side of p, with the opposite sign. A T that occurs twice adds up.
+        By the derivatives of the paper's appendix, which hold at dq = 0. A contact sees its word move by one twist,
+        which is the sum of what its letters make of theirs (`Words.adjoints`).
 
         Args:
-            B: (*, n, 6, 6), the body twist of each pose per unit of its coordinates.
+            B: (*, n, 6, 6), the body twist of each pose per unit of its coordinates; None stands for the twists.
         """
-        F = self.words.factors(self.constants, T)
-        lead = F.shape[:-4]
-        c, w = self.words.letters.shape
-        # behind[j] = F_j+1 .. F_w v and forms[j] = n F_1 .. F_j, from both ends of each word.
-        behind = self._behind(F)
-        forms = np.empty((*lead, w + 1, c, 1, 4))
-        forms[..., 0, :, 0, :] = self.plane
-        for j in range(w):
-            np.matmul(forms[..., j, :, :, :], F[..., j, :, :], out=forms[..., j + 1, :, :, :])
-        e = behind[..., 0, :, :, :] @ self.plane[:, :, None]
-        # f G_i of the generators G_i = d(dT)/dq_i (appendix), and p, on the side of each letter where its change acts.
-        fG = forms.reshape(*lead, (w + 1) * c, 4).take(self.words.sides, axis=-2) @ _GENERATORS
-        p = behind.reshape(*lead, (w + 1) * c, 3, 4).take(self.words.sides, axis=-3)
-        # B^t of each letter's pose, with its sign: what twists make of coordinates z.
-        signed = np.zeros((*B.shape[:-3], 2, self.n + 1, 6, 6))
-        signed[..., 0, : self.n, :, :] = np.swapaxes(B, -1, -2)
-        np.negative(signed[..., 0, :, :, :], out=signed[..., 1, :, :, :])
-        scaled = signed.reshape(*B.shape[:-3], 2 * (self.n + 1), 6, 6).take(self.words.signed_columns, axis=-3)
-        return e.reshape(*lead, 3 * c), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
+        prefixes = self.words.prefixes(self.constants, T)
+        reached = self._reached(prefixes)
+        equations = self.points @ reached
+        turned = self.words.adjoints(prefixes)
+        if B is not None:
+            turned = turned @ B.take(self.words.operation, axis=-3)
+        e = equations[..., 6].reshape(*T.shape[:-3], 3 * len(self))
+        return Linearised(reached[..., 6], e, equations[..., :6], turned)
 
-    def gathered(self, blocks: Array) -> Array:
-        """The transposed Jacobian (*, 6 n, 3 c) out of its blocks (*, c, w, 6, 3)."""
-        lead = blocks.shape[:-4]
-        c = len(self)
-        columns = self.words.columns
-        J = np.zeros((*lead, self.n + 1, c, 6, 3))
-        if self.words.once:
-            J[..., columns, np.arange(c)[:, None], :, :] = blocks
-        else:
-            for j in range(columns.shape[1]):
-                J[..., columns[:, j], np.arange(c), :, :] += blocks[..., j, :, :]
-        return np.swapaxes(J[..., : self.n, :, :, :], -3, -2).reshape(*lead, 6 * self.n, 3 * c)
+    def _reached(self, prefixes: Array) -> Array:
+        """n G D_a^-1 D_b of each contact for the six unit twists G, and without one, (*, c, 4, 7)."""
+        words = np.swapaxes(prefixes[..., -1, :, :, :], -1, -2)
+        return np.asarray(words.take(self.words.of, axis=-3) @ self._reach)
 
-    def _behind(self, F: Array) -> Array:
-        """(everything from letter j on) v, (*, w + 1, c, 3, 4)."""
-        c, w = self.words.letters.shape
-        points = np.empty((*F.shape[:-4], w + 1, c, 3, 4))
-        transposed = np.swapaxes(F, -1, -2)
-        points[..., w, :, :, :] = self.points
-        for j in reversed(range(w)):
-            np.matmul(points[..., j + 1, :, :, :], transposed[..., j, :, :], out=points[..., j, :, :, :])
-        return points
+    @cached_property
+    def _reach(self) -> Array:
+        """n G, (c, 4, 7)."""
+        return np.swapaxes((self.plane @ _TWISTS_AND_ONE).reshape(len(self), 7, 4), 1, 2)
+
+
+class Linearised(NamedTuple):
+    """Equations at some poses, and their derivative in two factors: of contacts, and of letters."""
+
+    forms: Array
+    """(*, c, 4), as of `CompactEquations.forms`."""
+    e: Array
+    """(*, 3 c), [m]."""
+    rows: Array
+    """(*, c, 3, 6), the derivative of e by the twist of its word, in the frame of the manipulated part."""
+    turned: Array
+    """(*, u, 6, 6), the twist of a word per unit of the coordinates of each of its unknown letters."""
+
+
+_TWISTS_AND_ONE = np.ascontiguousarray(np.swapaxes(np.concatenate([GENERATORS, np.eye(4)[None]]), 0, 1)).reshape(4, 28)
+"""d(dT)/dq_i of the appendix and the identity, side by side."""
 
 
 def build_compact_equations(system: Equations, n: int) -> CompactEquations:
     """Equations in compact form: three per contact, in the motion parameters of `n` operations."""
-    words = Words(system.letters, system.inverse, len(system.start), n)
+    words = words_of(system.letters, system.inverse, len(system.start), n)
     plane = np.zeros((len(words), 4))
     plane[system.contact] = system.plane
     points = moments(system.vertex[:, :3], system.contact, len(words))
@@ -137,13 +128,29 @@ def linearise_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, A
     Args:
         B: (*, n, 6, 6) or (*, n, 6, 6 n): what a change of z makes of the body twist of each pose.
     """
-    if B.shape[-1] == 6:
-        e, blocks = system.blocks(T, B)
-        return e, system.gathered(blocks)
-    # Every pose depends on every number of z: J by all body twists, times what z makes of them.
-    size = B.shape[-1]
-    e, blocks = system.blocks(T, np.broadcast_to(np.eye(6), (*T.shape[:-2], 6, 6)))
-    return e, np.asarray(np.swapaxes(B.reshape(*T.shape[:-3], size, size), -1, -2) @ system.gathered(blocks))
+    known, J = linearise_densely(system, T, B)
+    return known.e, np.swapaxes(J, -1, -2)
+
+
+def linearise_densely(system: CompactEquations, T: Array, B: Array) -> tuple[Linearised, Array]:
+    """The same with all that is known there, and the derivative as it is, (*, 3 c, 6 n)."""
+    shared = B.shape[-1] != 6
+    known = system.linearise(T, None if shared else B)
+    words = system.words
+    lead = T.shape[:-3]
+    g = len(words.letters)
+    # What z makes of the twist of each word, (*, g, 6, 6 n).
+    moved = np.zeros((*lead, g * 36 * words.n))
+    if words.once:
+        moved[..., words.entries] = known.turned
+    else:
+        for i, entries in enumerate(words.entries):
+            moved[..., entries] += known.turned[..., i, :, :]
+    moved = moved.reshape(*lead, g, 6, 6 * words.n).take(words.of, axis=-3)
+    J = (known.rows @ moved).reshape(*lead, 3 * len(system), 6 * words.n)
+    if shared:  # every pose depends on every number of z
+        J = J @ B.reshape(*lead, 6 * words.n, 6 * words.n)
+    return known, J
 
 
 def moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:

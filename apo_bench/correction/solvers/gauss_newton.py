@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, measure_largest_turn
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry import Array
@@ -87,7 +86,6 @@ def find_nearest_poses(
     L: Array,
     soft_m: Array | None = None,
     begin: Array | None = None,
-    kernels: Kernels | None = None,
 ) -> NearestPoses:
     """Change all poses as little as the contacts ask for.
 
@@ -97,13 +95,12 @@ def find_nearest_poses(
         soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
         begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
-        kernels: What is used in place of NumPy.
     """
     if poses.ndim == 4:
         L = np.broadcast_to(L, (len(poses), *L.shape[-3:]))
-        return solve_batch(system, poses, L, soft_m, begin, kernels, sparse=False)
+        return solve_batch(system, poses, L, soft_m, begin, sparse=False)
     z = None if begin is None else begin[None]
-    return solve_batch(system, poses[None], L[None], soft_m, z, kernels).at(0)
+    return solve_batch(system, poses[None], L[None], soft_m, z).at(0)
 
 
 def solve_batch(
@@ -112,7 +109,6 @@ def solve_batch(
     L: Array,
     soft_m: Array | None = None,
     begin: Array | None = None,
-    kernels: Kernels | None = None,
     sparse: bool | None = None,
 ) -> NearestPoses:
     """`find_nearest_poses` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
@@ -129,7 +125,7 @@ def solve_batch(
     if sparse:
         step = SparseStep(system, observed, L, soft_m)
     else:
-        step = DenseStep(system, observed, L, soft_m, kernels)
+        step = DenseStep(system, observed, L, soft_m)
     return _nearest(step, z)
 
 

@@ -156,10 +156,9 @@ def _shortest(e: Array, Jt: Array, z: Array) -> Array:
     """The shortest z that satisfies the linearised equations, (6 n,), damped as if they held."""
     if not len(e):
         return np.zeros(len(z))
-    J = Jt.T[None]
     m = len(e)
-    mu = damping(float(np.square(J).sum()) / m, float(e @ e) / m, _SETTLED)
-    return np.asarray(shortest_z(J, e[None], z[None], np.full((1, m), mu))[0])
+    mu = damping(float(np.square(Jt).sum()) / m, float(e @ e) / m, _SETTLED)
+    return np.asarray(shortest_z(Jt.T[None], e[None], z[None], np.full((1, m), mu))[0])
 
 
 def count_active_directions(Jt: Array, inequalities: Inequalities, nearest: NearestPoses) -> int:

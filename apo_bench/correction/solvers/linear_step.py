@@ -1,4 +1,4 @@
-"""One linear step of the solver: what differs between dense and sparse matrices, and what kernels do quicker.
+"""One linear step of the solver: what differs between dense and sparse matrices.
 
 The loop of `gauss_newton` knows no matrices. It asks a step to linearise the contact equations at some z, and for the
 shortest z that satisfies what was linearised.
@@ -9,9 +9,8 @@ from typing import Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.solvers.compact import CompactEquations, linearise_by
-from apo_bench.correction.solvers.kernels import Kernels, own
-from apo_bench.geometry import ADJOINTS, SERIES, Array, compute_exp_and_jacobian
+from apo_bench.correction.solvers.compact import CompactEquations, linearise_densely
+from apo_bench.geometry import Array, compute_exp_and_jacobian
 
 SURE = 1e-6
 NEXT = 1e-9
@@ -29,6 +28,8 @@ class LinearStep(Protocol):
     """(b, n, 6, 6) or (b, n, 6, 6 n): what a change of z makes of the body twists at T."""
     e: Array
     """(b, 3 c), [m]."""
+    forms: Array
+    """(b, c, 4): n D_a^-1 D_b of each contact."""
     sizes: Array
     """(3, b): the largest |e|, [m], the mean square of e of the equations that are demanded, that of the rows of J."""
     settled: tuple[float, float]
@@ -37,10 +38,6 @@ class LinearStep(Protocol):
     @property
     def Jt(self) -> Any:
         """(b, 6 n, 3 c)."""
-
-    @property
-    def forms(self) -> Array:
-        """(b, c, 4): n D_a^-1 D_b of each contact."""
 
     def linearise(self, z: Array, rows: Rows) -> None:
         """Linearise some observations at their z, (b, 6 n)."""
@@ -58,85 +55,55 @@ class LinearStep(Protocol):
 
 @final
 class DenseStep:
-    """Dense matrices, with kernels or without; errors may be shared."""
+    """Dense matrices; errors may be shared."""
 
     settled = SURE, NEXT
 
-    def __init__(
-        self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None, kernels: Kernels | None
-    ) -> None:
+    def __init__(self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None) -> None:
         b = len(observed)
-        n = system.n
         m = 3 * len(system)
         self._system = system
         self._observed = observed
         self._L = L
         self._soft2 = np.zeros(m) if soft_m is None else soft_m * soft_m
-        self.T = np.empty((b, n, 4, 4))
-        self.B = np.empty(L.shape)
+        self._demanded = (self._soft2 == 0.0) / max(m, 1)
+        self.T = observed
+        self.B = L
         self.e = np.empty((b, m))
-        self._J = np.empty((b, m, 6 * n))
+        self.forms = np.empty((b, len(system), 4))
+        self._J = np.empty((b, m, 6 * system.n))
         self.sizes = np.empty((3, b))
-        self._kernels = kernels if L.shape[-1] == 6 else None
-        if self._kernels is not None:
-            self._observed, self._L, self._soft2 = own(observed), own(L), own(self._soft2)
-            # What the kernels take, in the order of their parameters.
-            points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
-            self._contacts = system.words.table, np.array(system.constants), own(system.plane), own(points)
-            width = system.words.letters.shape[1]
-            self._scratch = np.zeros((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
-            self._factor = np.empty((m, m)), np.empty(m)
-            self._forms = np.empty((b, len(system), 4))
 
     @property
     def Jt(self) -> Array:
         return np.swapaxes(self._J, 1, 2)
 
-    @property
-    def forms(self) -> Array:
-        return self._system.forms(self.T) if self._kernels is None else self._forms
-
     def linearise(self, z: Array, rows: Rows) -> None:
-        # The kernel does what the lines below it do.
-        if self._kernels is not None:
-            known = *self._contacts, self._observed, self._L, self._soft2
-            results = self.T, self.B, self.e, self._J, self._forms, self.sizes
-            self._kernels.linearise(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
+        whole = len(rows) == len(self.T)
+        some = slice(None) if whole else rows
+        T, B = compute_poses_at(self._observed[some], self._L[some], z[some])
+        (forms, e, _, _), J = linearise_densely(self._system if whole else self._system.only(rows), T, B)
+        squares = np.einsum("bij,bij->b", J, J) / max(e.shape[1], 1)
+        sizes = np.array([np.abs(e).max(axis=1, initial=0.0), (e * e) @ self._demanded, squares])
+        if whole:
+            self.T, self.B, self.forms, self.e, self._J, self.sizes = T, B, forms, e, J, sizes
             return
-        some = self._views(rows)
-        self.T[some], self.B[some] = compute_poses_at(self._observed[some], self._L[some], z[some])
-        e, Jt = linearise_by(self._system.only(some), self.T[some], self.B[some])
-        m = max(self.e.shape[1], 1)
-        self.e[some] = e
-        self._J[some] = np.swapaxes(Jt, 1, 2)
-        self.sizes[0, some] = np.abs(e).max(axis=1, initial=0.0)
-        self.sizes[1, some] = (e * e) @ (self._soft2 == 0.0) / m
-        self.sizes[2, some] = np.einsum("bij,bij->b", Jt, Jt) / m
+        self.sizes[:, rows] = sizes
+        for kept, made in ((self.T, T), (self.B, B), (self.forms, forms), (self.e, e), (self._J, J)):
+            kept[rows] = made
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
-        # The kernel does what the lines below it do, by a Cholesky decomposition.
-        if self._kernels is not None:
-            step = np.empty((len(rows), z.shape[1]))
-            largest = np.empty(len(rows))
-            angles = np.empty(len(rows))
-            known = self._J, self.e, z, self._L, mu, self._soft2
-            self._kernels.change(*known, rows, *self._factor, step, largest, angles)
-            return step, largest, angles
-        some = self._views(rows)
+        some = slice(None) if len(rows) == len(self.T) else rows
         step = shortest_z(self._J[some], self.e[some], z[some], mu[:, None] + self._soft2) - z[some]
         return step, np.abs(step).max(axis=1, initial=0.0), measure_largest_turn(step, self._L[some])
-
-    def _views(self, rows: Rows) -> Any:
-        """The same rows; a slice where that is all, which copies nothing."""
-        return slice(None) if len(rows) == len(self.T) else rows
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
         self.T[which] = self._observed[which]
         self.B[which] = self._L[which]
         self._J[which] = 0.0
-        self.e[which] = self._system.only(np.flatnonzero(which)).residual(self.T[which])
-        if self._kernels is not None:
-            self._forms[which] = self._system.forms(self.T[which])
+        left = self._system.only(np.flatnonzero(which))
+        self.e[which] = left.residual(self.T[which])
+        self.forms[which] = left.forms(self.T[which])
 
 
 def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Pattern, find_contact_pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
-from apo_bench.correction.solvers.word_products import Words
+from apo_bench.correction.solvers.word_products import Words, words_of
 from apo_bench.geometry import Array, pose, remember
 
 _ONE = np.eye(4)
@@ -86,7 +86,7 @@ def _corners(assembly: Assembly) -> _Corners:
     normal[:, 3] = 0.0
     return _Corners(
         known,
-        Words(known.letters, known.inverse, len(assembly.solids), len(assembly)),
+        words_of(known.letters, known.inverse, len(assembly.solids), len(assembly)),
         known.laid[:, None, None],
         known.corners[..., None],
         moments(known.corners[:, :3], known.contact, len(known.letters)),

@@ -40,7 +40,7 @@ class Incidence:
     contact: NDArray[np.intp]
     """(i,)."""
     letter: NDArray[np.intp]
-    """(i,)."""
+    """(i,): as of `Words.unknown`."""
     operation: NDArray[np.intp]
     """(i,)."""
     c: int
@@ -69,8 +69,8 @@ class Incidence:
 
 def incidence(system: CompactEquations) -> Incidence:
     """The letters of a system that are unknown."""
-    contact, letter = np.nonzero(system.words.columns < system.n)
-    return Incidence(contact, letter, system.words.columns[contact, letter], len(system), system.n)
+    contact, letter = system.words.incidence
+    return Incidence(contact, letter, system.words.operation[letter], len(system), system.n)
 
 
 def sparse_solver(where: Incidence) -> _Solver:
@@ -102,6 +102,7 @@ class SparseStep:
         self.e = np.zeros((1, len(self._soft2)))
         self.T = observed
         self.B = L
+        self.forms = np.zeros((1, len(system), 4))
         self.sizes = np.zeros((3, 1))
         self._blocks = np.zeros((len(self._where.contact), 6, 3))
 
@@ -109,15 +110,11 @@ class SparseStep:
     def Jt(self) -> list[Any]:
         return [self._where.matrix(self._blocks).T]
 
-    @property
-    def forms(self) -> Array:
-        return self._system.forms(self.T)
-
     def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
         self.T, self.B = compute_poses_at(self._observed, self._L, z)
-        e, every = self._system.blocks(self.T[0], self.B[0])
-        self.e = e[None]
-        self._blocks = every[self._where.contact, self._where.letter]
+        forms, e, contacts, letters = self._system.linearise(self.T[0], self.B[0])
+        self.forms, self.e = forms[None], e[None]
+        self._blocks = np.swapaxes(contacts[self._where.contact] @ letters[self._where.letter], 1, 2)
         self.sizes[0] = np.abs(e).max(initial=0.0)
         self.sizes[1] = (e * e) @ (self._soft2 == 0.0) / max(len(e), 1)
         self.sizes[2] = np.square(self._blocks).sum() / max(len(e), 1)
@@ -132,6 +129,7 @@ class SparseStep:
         self.T = self._observed
         self.B = self._L
         self.e = self._system.residual(self.T)
+        self.forms = self._system.forms(self.T)
 
 
 def sparse_rank(Jt: Any) -> int:

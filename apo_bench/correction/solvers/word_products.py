@@ -1,6 +1,7 @@
-"""The product of poses in each contact equation, D_a^-1 D_b, at the poses of many observations at once.
+"""The relative pose in each contact equation, D_a^-1 D_b, and how it moves with the poses of the operations.
 
 Such a product is a word, and the poses in it, start poses and operations' poses or their inverses, are its letters.
+Contacts between the same parts have the same word, which is multiplied out once.
 """
 
 from __future__ import annotations
@@ -12,57 +13,62 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array, remember
+from apo_bench.geometry import ADJOINTS, Array, remember
 
 _ONE = np.eye(4)
+_HAT = np.ascontiguousarray(ADJOINTS[3:, :3, :3]).reshape(3, 9)
+"""The matrix of the cross product with t is sum_i t_i _HAT[i], rows of three."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Words:
-    """c words of at most w letters, in the motion parameters of n operations and p constants."""
+    """g words of at most w letters, in the motion parameters of n operations and p constants, of c contacts."""
 
     letters: NDArray[np.intp]
-    """(c, w): as in `Equations`: p constants, then n poses, then the identity as padding."""
+    """(g, w): as in `Equations`: p constants, then n poses, then the identity as padding."""
     inverse: NDArray[np.bool_]
-    """(c, w): which letters are inverted."""
+    """(g, w): which letters are inverted."""
+    of: NDArray[np.intp]
+    """(c,): the word of each contact."""
     p: int
     n: int
 
     def __len__(self) -> int:
-        return len(self.letters)
+        return len(self.of)
 
     def among(self, contacts: NDArray[np.bool_]) -> Words:
         """The words of these contacts, (c,), alone."""
         return _among(self, contacts.tobytes())
 
     @cached_property
-    def columns(self) -> NDArray[np.intp]:
-        """(c, w): the operation of each letter; n for letters that are constants or padding."""
-        k = self.letters - self.p
-        return np.where((k >= 0) & (k < self.n), k, self.n)
+    def unknown(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The words and places, (u,), of the letters that are poses of operations."""
+        word, place = np.nonzero((self.letters >= self.p) & (self.letters < self.p + self.n))
+        return word, place
 
     @cached_property
-    def signed_columns(self) -> NDArray[np.intp]:
-        """(c, w): the column of each letter, behind all columns where the sign changes."""
-        return self.columns + self.inverse * (self.n + 1)
+    def operation(self) -> NDArray[np.intp]:
+        """(u,): the operation of each unknown letter."""
+        return np.asarray(self.letters[self.unknown] - self.p)
+
+    @cached_property
+    def incidence(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Every pair of a contact and an unknown letter of its word, (i,)."""
+        contact, letter = np.nonzero(self.of[:, None] == self.unknown[0])
+        return contact, letter
 
     @cached_property
     def once(self) -> bool:
         """Whether no motion parameter occurs twice in a word."""
-        ordered = np.sort(self.columns, axis=1)
-        return not bool(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] < self.n)).any())
+        return len(np.unique(self.unknown[0] * self.n + self.operation)) == len(self.operation)
 
     @cached_property
-    def sides(self) -> NDArray[np.intp]:
-        """(c, w): where the points and planes of each letter stand among those of all, (w + 1, c)."""
-        c, w = self.letters.shape
-        return (np.arange(w) + ~self.inverse) * c + np.arange(c)[:, None]
-
-    @cached_property
-    def table(self) -> NDArray[np.intp]:
-        """(3, c, w): letters, columns and inverse (0 or 1), as kernels take them."""
-        return np.array([self.letters, self.columns, self.inverse], dtype=np.intp)
+    def entries(self) -> NDArray[np.intp]:
+        """(u, 6, 6): where the block of each unknown letter stands in a matrix (g, 6, n, 6)."""
+        six = np.arange(6)
+        first = (6 * self.unknown[0][:, None] + six) * self.n + self.operation[:, None]
+        return 6 * first[:, :, None] + six
 
     def constants(self, start: Array) -> Array:
         """All matrices and then their inverses, (2, p + n + 1, 4, 4), of the poses the last row alone.
@@ -77,35 +83,70 @@ class Words:
         _invert(start, stack[1, : self.p])
         return stack
 
-    def factors(self, constants: Array, T: Array) -> Array:
-        """Every letter of every word, (*, c, w, 4, 4), at the poses T, (*, n, 4, 4)."""
+    def prefixes(self, constants: Array, T: Array) -> Array:
+        """The product of the first j letters of every word, (*, w + 1, g, 4, 4), at the poses T, (*, n, 4, 4)."""
         first = self.p
         last = first + self.n
-        stack = np.empty((*T.shape[:-3], *constants.shape))
+        lead = T.shape[:-3]
+        stack = np.empty((*lead, *constants.shape))
         stack[:] = constants
         stack[..., 0, first:last, :, :] = T
         _invert(T, stack[..., 1, first:last, :, :])
-        return stack.reshape(*T.shape[:-3], 2 * constants.shape[1], 4, 4).take(self._rows, axis=-3)
+        F = stack.reshape(*lead, 2 * constants.shape[1], 4, 4).take(self._rows, axis=-3)
+        products = np.empty((*lead, len(self._rows) + 1, len(self.letters), 4, 4))
+        products[..., 0, :, :, :] = _ONE
+        for j in range(len(self._rows)):
+            np.matmul(products[..., j, :, :, :], F[..., j, :, :, :], out=products[..., j + 1, :, :, :])
+        return products
 
     def products(self, constants: Array, T: Array) -> Array:
         """D_a^-1 D_b of every contact, (*, c, 4, 4), at the poses T, (*, n, 4, 4)."""
-        F = self.factors(constants, T)
-        M = np.broadcast_to(_ONE, (*F.shape[:-3], 4, 4))
-        for j in range(F.shape[-3]):
-            M = M @ F[..., j, :, :] if j else F[..., j, :, :]
-        return np.asarray(M)
+        return self.prefixes(constants, T)[..., -1, :, :, :].take(self.of, axis=-3)
+
+    def adjoints(self, prefixes: Array) -> Array:
+        """What the body twist of each unknown letter makes of the twist of its word, (*, u, 6, 6), in the frame of a.
+
+        A pose T in F T .. turns by a body twist xi: F T exp(xi) = exp(Ad xi) F T .., with Ad that of F T; T^-1 turns by
+        -xi on its left, with Ad that of F.
+        """
+        P = prefixes.reshape(*prefixes.shape[:-4], -1, 4, 4).take(self._sides, axis=-3)
+        P[..., :3] *= self._signs
+        R = P[..., :3, :3]
+        A = np.zeros((*P.shape[:-2], 6, 6))
+        A[..., :3, :3] = R
+        A[..., 3:, 3:] = R
+        np.matmul((P[..., :3, 3] @ _HAT).reshape(R.shape), R, out=A[..., :3, 3:])
+        return A
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
-        """(c, w): where each letter stands among all matrices and then their inverses."""
-        return self.letters + self.inverse * (self.p + self.n + 1)
+        """(w, g): where each letter stands among all matrices and then their inverses."""
+        return np.ascontiguousarray((self.letters + self.inverse * (self.p + self.n + 1)).T)
+
+    @cached_property
+    def _sides(self) -> NDArray[np.intp]:
+        """(u,): where the product up to each unknown letter stands among the prefixes, (w + 1, g)."""
+        word, place = self.unknown
+        return np.asarray((place + ~self.inverse[word, place]) * len(self.letters) + word)
+
+    @cached_property
+    def _signs(self) -> Array:
+        """(u, 1, 1): -1 of letters that are inverted."""
+        return np.where(self.inverse[self.unknown], -1.0, 1.0)[:, None, None]
 
 
 @remember
 def _among(words: Words, contacts: bytes) -> Words:
     """As of `Words.among`: relations are left out in turn of one assembly, again and again."""
-    kept = np.frombuffer(contacts, dtype=np.bool_)
-    return Words(words.letters[kept], words.inverse[kept], words.p, words.n)
+    return Words(words.letters, words.inverse, words.of[np.frombuffer(contacts, dtype=np.bool_)], words.p, words.n)
+
+
+def words_of(letters: NDArray[np.intp], inverse: NDArray[np.bool_], p: int, n: int) -> Words:
+    """The words of c contacts, (c, w), those that are the same put together."""
+    c, w = letters.shape
+    table = np.concatenate([letters, inverse], axis=1)
+    different, of = np.unique(table, axis=0, return_inverse=True) if c else (table, np.zeros(0, dtype=np.intp))
+    return Words(different[:, :w], different[:, w:] != 0, of.reshape(c), p, n)
 
 
 def _invert(T: Array, out: Array) -> None:

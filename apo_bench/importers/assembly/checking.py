@@ -159,7 +159,7 @@ def _ways(scenario: Scenario) -> Iterator[str]:
 
 def _play(scenario: Scenario) -> Iterator[str]:
     assembly = scenario.assembly
-    stages = compute_placements(assembly, scenario.start, scenario.goals)
+    stages = compute_placements(assembly, scenario.start, scenario.nominal_poses)
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
         for contact, opposite in walls_without_play(assembly.solids, poses, operation.contacts):
             yield (

@@ -22,7 +22,7 @@ THRESHOLDS = {
     "support_mm": "gap of other contacts",
     "overlap_fraction": "share of the true overlap that must be covered",
     "penetration_mm": "depth of one part in another",
-    "displaced_mm": "sliding of a part on another one after both were put down",
+    "placed_part_shift_mm": "sliding of a part on another one after both were put down",
     "rest_mm_s": "speed below which a part is at rest",
     "rest_deg_s": "turning speed below which a part is at rest",
     "loose_gap_mm": "gap of the loose verdict",

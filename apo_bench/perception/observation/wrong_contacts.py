@@ -1,8 +1,8 @@
 """Sources of wrong contacts, to test what a corrector makes of them.
 
-`missed`     one contact was not noticed
-`false`      one contact too many: two faces that only come near each other
-`shifted:3`  one face is not where the model of its part says, by 3 mm along its normal
+`omit_contact`  one contact is missing
+`add_contact`   one contact too many: two faces that only come near each other
+`FaceOffset`    one face lies off the face of the part's model, along its normal
 
 The truth, the human, the robot and the judge keep the right contacts; only what a corrector gets is wrong.
 """
@@ -33,7 +33,7 @@ from apo_bench.assembly import (
 from apo_bench.errors import RAISED, InputError, failed, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, compute_overlap
 from apo_bench.names import resolve
-from apo_bench.records import GIVEN, SHIFT_MM, WRONG_CONTACTS, normalise_contact_source
+from apo_bench.records import FACE_OFFSET_MM, GIVEN, WRONG_CONTACTS, normalise_contact_source, parse_face_offset
 
 ContactSource = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, poses, rng) -> Assembly`: right contacts and poses in, wrong contacts out."""
@@ -53,7 +53,7 @@ def make_contacts(given: Any) -> ContactSource | None:
     """Return the function that a name stands for; None for `given`, where nothing is wrong.
 
     Args:
-        given: `given`, `missed`, `false`, `shifted:3` (mm), `"package.module:name"`, or the function itself.
+        given: A name as in `apo_bench.records.contact_sources`, `"package.module:name"`, or the function itself.
 
     Raises:
         InputError: There is no such thing.
@@ -63,8 +63,8 @@ def make_contacts(given: Any) -> ContactSource | None:
     )
     if name == GIVEN:
         return None
-    if isinstance(given, str) and name.startswith("shifted:"):
-        return Shifted(float(name.partition(":")[2]) * 1e-3)
+    if isinstance(given, str) and name.startswith("face-offset:"):
+        return FaceOffset(parse_face_offset(name) * 1e-3)
     source = resolve(name, WRONG_CONTACTS, "source of contacts") if isinstance(given, str) else given
     require(
         callable(source) and not isinstance(source, type),
@@ -120,13 +120,13 @@ def culprit(right: Assembly, wrong: Assembly) -> str | None:
     return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
-def missed(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
+def omit_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
     """One contact, any, is not there."""
     k, contact = _any(assembly, rng)
     return _with(assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact))
 
 
-def false(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
+def add_contact(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
     """One contact too many: a face of a part that was moved and one that it faces, less than 15 mm apart.
 
     Where no two faces come so near, the nearest pair is taken that covers each other, or, failing that, that look at
@@ -145,13 +145,13 @@ def false(assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generat
 
 @final
 @dataclass(frozen=True)
-class Shifted:
+class FaceOffset:
     """One contact, any, has its lower face off along the normal, outwards or inwards.
 
     A round face is off across its axis, in any direction.
     """
 
-    size_m: float = SHIFT_MM * 1e-3
+    size_m: float = FACE_OFFSET_MM * 1e-3
 
     def __call__(self, assembly: Assembly, start: Poses, poses: Array, rng: np.random.Generator) -> Assembly:
         k, contact = _any(assembly, rng)

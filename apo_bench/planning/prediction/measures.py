@@ -237,7 +237,7 @@ def _drawn(
     same = np.ones_like(fit.size)
     yield fit
     yield DrawnMeasure(k, "side", _side_mm(act), thresholds.support_mm * same)
-    deep_mm = thresholds.fit_margin_mm if act.operation.carries else thresholds.displaced_mm
+    deep_mm = thresholds.fit_margin_mm if act.operation.carries else thresholds.placed_part_shift_mm
     for depths_m in depths_on_way(act.operation, act.planned, how, physical):
         yield DrawnMeasure(k, "on_way", 1e3 * depths_m, deep_mm * same)
     for depths_m in depths_from_above(act.operation, act.planned, how, physical):
@@ -260,7 +260,7 @@ def _by_arm(
     same = np.ones_like(fit.size)
     how = attach[act.number] if attach else None
     for move in (move for move in arm if move.operation == act.number and not move.undo):
-        allowed = thresholds.displaced_mm * same
+        allowed = thresholds.placed_part_shift_mm * same
         yield DrawnMeasure(act.number, "gripper", move.struck_mm * same, allowed, move.struck)
         yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 

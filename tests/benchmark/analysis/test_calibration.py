@@ -20,7 +20,7 @@ def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: A
 
 
 def test_calibration_counts_coverage_alarms_and_culprits() -> None:
-    wrong = {"contact_source": "shifted:3", "wrong_contact": "R2"}
+    wrong = {"contact_source": "face-offset:3mm", "wrong_contact": "R2"}
     rows = [
         *(
             row("oracle", seed=0),
@@ -40,7 +40,7 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
         ),
         corrected(3, False, ("R3",), **wrong | {"contact_source": "false-negative", "wrong_contact": None}),
     ]
-    raw, right, missed, shifted = tabulate_calibration(rows)
+    raw, right, shifted, missed = tabulate_calibration(rows)
     assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == [
         "uncorrected",
         (0, 0),
@@ -55,4 +55,4 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert (missed["failed_tests"], missed["culprits"]) == ((1, 1), (0, 0))
     lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
     assert "| uncorrected | 0 | – | – | – | – | – | – |" in lines
-    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
+    assert "| face-offset:3mm | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines

@@ -69,7 +69,7 @@ def row(method: str = "uncorrected", seed: int = 0, success: bool | None = True,
         "failure_prediction": None if success is None else foretold(failed),
         "extra_steps": None if success is None else 0,
         "sim_time_s": None if success is None else 20.0,
-        "displaced_mm": None if success is None else 0.1,
+        "placed_part_shift_mm": None if success is None else 0.1,
     } | more
 
 
@@ -135,7 +135,11 @@ def test_predictions_are_counted_against_physics() -> None:
         row(seed=6, success=False, failure_stage="correct", failure_operation=None, failure_prediction=None),
         row(seed=7, success=None),
         row(
-            seed=8, success=False, failure_stage="promise", failure_code="abstained", failure_prediction=foretold(False)
+            seed=8,
+            success=False,
+            failure_stage="predicted-success",
+            failure_code="abstained",
+            failure_prediction=foretold(False),
         ),
         row("oracle", seed=0),
         row(seed=0, scenario="stick_on_castles", noise_mm=None, noise_deg=None, human_error_scale=None),
@@ -206,9 +210,9 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
 def test_effort_counts_what_was_right() -> None:
     rows = [
         row("paper", 0),
-        row("paper-track", 0, extra_steps=2, sim_time_s=26.0, displaced_mm=0.3),
-        row("paper-track", 1, extra_steps=4, sim_time_s=28.0, displaced_mm=0.2),
-        row("paper-track", 2, success=False, extra_steps=9, sim_time_s=99.0, displaced_mm=9.0),
+        row("paper-track", 0, extra_steps=2, sim_time_s=26.0, placed_part_shift_mm=0.3),
+        row("paper-track", 1, extra_steps=4, sim_time_s=28.0, placed_part_shift_mm=0.2),
+        row("paper-track", 2, success=False, extra_steps=9, sim_time_s=99.0, placed_part_shift_mm=9.0),
         row("uncorrected", 0, success=False),
     ]
     assert [list(line.values()) for line in tabulate_effort(rows)] == [

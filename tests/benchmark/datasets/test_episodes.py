@@ -59,7 +59,7 @@ def test_frames_end_where_the_replay_did(made: Path) -> None:
     assert {frame["operation"] for frame in frames} - {None} == {1, 2}
     assert max(frame["force_n"] for frame in frames) > 0.1
     last = dict(zip(one["parts"], np.reshape(frames[-1]["part_poses"], (-1, 7)), strict=True))
-    planned = dict(zip(one["main_parts"], np.reshape(one["planned_goals"], (-1, 7)), strict=True))
+    planned = dict(zip(one["main_parts"], np.reshape(one["planned_poses"], (-1, 7)), strict=True))
     for part, at in planned.items():
         np.testing.assert_allclose(last[part][:3], at[:3], atol=1e-3)
     assert len(frames[0]["joints"]) == 6
@@ -99,7 +99,7 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
     for each in read(tmp_path / "a" / "episodes.parquet"):
         frames = tmp_path / "a" / "frames" / f"{each['episode']:06}.parquet"
         assert frames.exists() == (each["frames"] > 0)
-        assert (each["planned_goals"] is not None) or not each["frames"]
+        assert (each["planned_poses"] is not None) or not each["frames"]
 
 
 @pytest.mark.parametrize(

@@ -41,10 +41,10 @@ def test_one_demonstration_is_seen_as_the_noise_model_sees_it(noise: str | type)
     start = {part: poses[0] for part, poses in layouts.start.items()}
     one = model(
         scenario.assembly,
-        Demonstration(scenario.assembly, start, layouts.goals[0], {}, human_error_scale),
+        Demonstration(scenario.assembly, start, layouts.poses[0], {}, human_error_scale),
         np.random.default_rng(2),
     )
-    assert many.goals[0].tobytes() == one.poses.tobytes()
+    assert many.poses[0].tobytes() == one.poses.tobytes()
     assert many.covariance[0].tobytes() == one.covariance.tobytes()
     assert many.seen[0].tobytes() == one.observed.tobytes()
 
@@ -55,7 +55,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
 
     def drawn() -> np.ndarray:
         many = draw_pairs("carried_bridge", noise, 256, 4, noise_level=2.0, human_error_scale=0.0)
-        xi = pose.log(pose.inverse(many.truth) @ many.goals)
+        xi = pose.log(pose.inverse(many.truth) @ many.poses)
         sizes = np.linalg.norm(xi.reshape(256, -1, 2, 3), axis=-1)
         quartiles = np.quantile(sizes[many.seen], [0.25, 0.5, 0.75], axis=0)
         stated = np.sqrt(np.median(np.diagonal(many.covariance, axis1=2, axis2=3), axis=0)[:, [0, 3]])
@@ -74,7 +74,7 @@ def test_every_contact_of_the_truth_holds(name: str) -> None:
     scenario = load_scenario(name)
     layouts = draw_layouts(scenario, drawing.seed_block(0, name, 0), 2)
     many = draw_pairs(name, n=2)
-    np.testing.assert_array_equal(many.truth, layouts.goals)
+    np.testing.assert_array_equal(many.truth, layouts.poses)
     for i, goals in enumerate(many.truth):
         start = {part: poses[i] for part, poses in layouts.start.items()}
         assert np.abs(build_contact_equations(scenario.assembly, start, goals).gaps(goals)).max() < 1e-9
@@ -85,7 +85,7 @@ def test_more_pairs_begin_with_the_same_ones() -> None:
     many = draw_pairs("dovetail", "outliers", drawing.BLOCK + 5, 7, noise_level=(1.0, 2.0))
     blocks = draw_endless_pairs("dovetail", "outliers", 7, noise_level=(1.0, 2.0))
     first, second = next(blocks), next(blocks)
-    for name in ("goals", "covariance", "seen", "truth"):
+    for name in ("poses", "covariance", "seen", "truth"):
         np.testing.assert_array_equal(getattr(many, name)[:5], getattr(few, name))
         joined = np.concatenate([getattr(first, name), getattr(second, name)[:5]])
         np.testing.assert_array_equal(joined, getattr(many, name))

@@ -162,12 +162,3 @@ def test_tables_are_the_same_as_parquet(made: Report) -> None:
 def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", trials))
     assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["noise_mm"] is not None for r in trials)
-
-
-def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
-    two = [row("uncorrected"), row("contact", gap_before_mm=1.0, gap_after_mm=0.0)]
-    folder = write(tmp_path / "run", two)
-    older = set(report(folder).figures)
-    newer = set(report(write(folder, two[:1])).figures)
-    assert {path.name for path in older - newer} == {"difference_to_uncorrected.svg", "gap_before_and_after.svg"}
-    assert not any(path.exists() for path in older - newer)

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from apo_bench import InputError
 from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, read_entry, score_of, write_entry
-from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
+from apo_bench.benchmark.scoring.leaderboard import ranked
 
 
 def track(overall: bool = True, secret_seed: str | None = None, file: str = "f" * 16, **cells: str) -> TrackScore:
@@ -101,17 +101,3 @@ def test_verified_is_who_was_run_with_a_salt_of_the_organiser_in_every_track() -
     told = {line.entry.name: line.status for line in ranked([salted, half], frozenset({secret_seed}))}
     assert told == {"salted": "verified", "half": "self-reported"}
     assert {line.status for line in ranked([salted, half])} == {"self-reported"}
-
-
-def test_the_page_has_every_entry_and_its_figure(tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    for name, cells in (("one", "10"), ("two", "11")):
-        write_entry(entry(name, given=track(a=cells)), tmp_path / "in" / f"{name}.json")
-    entries, left_out = read_entries(tmp_path / "in")
-    assert not left_out
-    write_leaderboard(entries, tmp_path / "page.md")
-    text = (tmp_path / "page.md").read_text()
-    assert text.index("| 1 | two |") < text.index("| 2 | one |")
-    assert (tmp_path / "page.png").stat().st_size > 1000
-    assert "self-reported" in text
-    assert len(leaderboard_table(ranked([entry("one", given=track(a="1"))])).markdown()) == 3

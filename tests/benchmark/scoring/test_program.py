@@ -18,7 +18,7 @@ from apo_bench.benchmark.scoring.program import LARGEST_ANSWER_BYTES, ask_progra
 from tests import round_contacts, scenes
 
 TOWER = scenes.stick_in_tower()
-SEEN = scenes.seen(TOWER, TOWER.goals)
+SEEN = scenes.seen(TOWER, TOWER.nominal_poses)
 ANSWER = """
 request = json.loads(sys.stdin.readline())
 print(json.dumps({"poses": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))

@@ -84,9 +84,11 @@ def test_the_grid_is_every_combination_once() -> None:
 
 def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None:
     spec = replace(
-        SPEC, noise=("isotropic", "per-part"), contact_source=("given", "false-negative", "shifted:3.0", "shifted:3")
+        SPEC,
+        noise=("isotropic", "per-part"),
+        contact_source=("given", "false-negative", "face-offset:3.0mm", "face-offset:3mm"),
     )
-    assert spec.contact_source == ("given", "false-negative", "shifted:3")
+    assert spec.contact_source == ("given", "false-negative", "face-offset:3mm")
     loaded = load_all([spec])
     trials = [t for unit in units([spec], loaded) for t in unit]
     keys = {make_trial_key(t, "stick_in_tower") for t in trials}

@@ -23,7 +23,7 @@ SIGMA = np.repeat([1e-3, np.radians(1.0)], 3)
 
 def noisy(name: str, seed: int = 0) -> Observation:
     built = scenes.ALL[name]()
-    return scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(seed), 1.0, 1.0))
+    return scenes.seen(built, scenes.noisy(built.nominal_poses, np.random.default_rng(seed), 1.0, 1.0))
 
 
 def length(seen: Observation, goals: Array) -> float:
@@ -37,10 +37,10 @@ def length(seen: Observation, goals: Array) -> float:
 def test_what_is_consistent_stays_as_it_is(method: str, within: float, name: str) -> None:
     """But for `penalty`: Adam follows gradients that are rounding, and ended up to 4.5e-4 away under other kernels."""
     built = scenes.ALL[name]()
-    made = correct(scenes.seen(built, built.goals), method)
+    made = correct(scenes.seen(built, built.nominal_poses), method)
     assert made.ok
     assert made.gap_after_m < 1e-6
-    assert np.abs(made.poses - built.goals).max() < within
+    assert np.abs(made.poses - built.nominal_poses).max() < within
 
 
 @pytest.mark.parametrize("method", [*STATIC, settle])
@@ -65,7 +65,7 @@ def test_snap_takes_the_most_likely_of_all_poses_that_fit() -> None:
 def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -> None:
     """The truth has no gap, so at the optimum (e / contact_m)^2 + |z|^2 is at most the squared length of the noise."""
     seen = noisy(name)
-    truth = scenes.ALL[name]().goals
+    truth = scenes.ALL[name]().nominal_poses
     made = correct(seen, partial(least_squares, contact_m=contact_m))
     assert made.gap_after_m**2 / contact_m**2 + length(seen, made.poses) ** 2 <= length(seen, truth) ** 2 * (1 + 1e-9)
     assert made.gap_after_m < 0.5 * contact_m

@@ -46,7 +46,7 @@ def together(deg: float) -> Error:
 
 def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Collection[int]) -> float:
     """What remains, [mm], when operations (from 1) are wrong and others (from 1) may change."""
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
@@ -96,7 +96,7 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) ->
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     for level in (0.5, 1.0, 2.0):
-        seen = scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level))
+        seen = scenes.seen(scene, scenes.noisy(scene.nominal_poses, rng, level, level))
         found = paper(seen)
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
@@ -122,7 +122,7 @@ def drift(scene: scenes.Scene, seen: Array) -> float:
 def test_free_directions_stay_where_they_were_seen(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(7)
-    drifts = [drift(scene, scenes.noisy(scene.goals, rng, 2.0, 1.0)) for _ in range(10)]
+    drifts = [drift(scene, scenes.noisy(scene.nominal_poses, rng, 2.0, 1.0)) for _ in range(10)]
     assert max(drifts) < 0.2
 
 
@@ -138,7 +138,7 @@ def contradiction() -> Observation:
     )
     operation = scenes.Operation("block", scenes.touch("block", "table", "nz-top", "pz-roof"))
     scene = scenes.scene([low, scenes.block()], [operation], [scenes.mm(0, 0, 27)])
-    return scenes.seen(scene, scene.goals)
+    return scenes.seen(scene, scene.nominal_poses)
 
 
 def test_contacts_that_contradict_each_other_are_inconsistent() -> None:
@@ -176,7 +176,7 @@ def test_a_careless_human_frees_the_candidates_of_the_paper(
 
 
 def tilted(scene: scenes.Scene, k: int, mm: float, deg: float) -> Array:
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[k] = goals[k] @ scenes.mm(0.4, -0.3, mm, (deg, -deg, 3.0))
     return goals
 
@@ -198,7 +198,7 @@ def test_a_goal_that_is_no_candidate_is_settled_for_what_it_makes() -> None:
 
 def noisy_tower() -> Observation:
     scene = scenes.stick_in_tower()
-    return scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0))
+    return scenes.seen(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(4), 1.0, 1.0))
 
 
 def test_correct_by_name_by_path_and_by_object() -> None:

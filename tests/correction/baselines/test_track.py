@@ -78,7 +78,7 @@ def walked(found: Correction) -> dict[int, Array]:
 def test_the_schedule_ends_at_the_goals(name: str, level: float) -> None:
     scene = scenes.ALL[name]()
     for seed in range(3):
-        goals = scenes.noisy(scene.goals, np.random.default_rng(seed), level, level)
+        goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), level, level)
         found = paper_track(scenes.seen(scene, goals))
         assert found.ok
         done = walked(found)

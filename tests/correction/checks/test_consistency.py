@@ -41,7 +41,7 @@ def shifted(assembly: Assembly, by_mm: Mapping[str, float]) -> Assembly:
 
 def look(scene: scenes.Scene, seed: int, by_mm: Mapping[str, float] | None = None) -> Observation:
     """An observation at 1 mm and 1 degree, with some relations told wrongly."""
-    seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0))
+    seen = scenes.seen(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), 1.0, 1.0))
     return replace(seen, assembly=shifted(scene.assembly, by_mm or {}))
 
 
@@ -53,7 +53,8 @@ def consistency_of(made: Correction) -> Consistency:
 def p_values(scene: scenes.Scene, draws: int, times: float = 1.0) -> list[float]:
     """Of draws at 1 mm and 1 degree, whose noise is `times` what is stated."""
     looks = [
-        scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)) for seed in range(draws)
+        scenes.seen(scene, scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), 1.0, 1.0))
+        for seed in range(draws)
     ]
     stated = [replace(seen, covariance=seen.covariance / times**2) for seen in looks]
     return [consistency_of(made).p_value for made in correct_many(stated, ContactCorrector("apply"))]

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.numeric
 
 def seen(seed: int = 0) -> Observation:
     built = scenes.stick_in_tower()
-    return scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(seed), 2.0, 1.0))
+    return scenes.seen(built, scenes.noisy(built.nominal_poses, np.random.default_rng(seed), 2.0, 1.0))
 
 
 def edited(name: str, change: Callable[[Array], None]) -> Observation:

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, correct, draw_layout, load_scenario
-from apo_bench.assembly import OutlierModel, find_faces_away, measure_largest_gap
+from apo_bench.assembly import find_faces_away, measure_largest_gap
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
@@ -89,22 +89,6 @@ def test_what_was_missed_is_inferred(name):
     assert correct(observation, "contact").status == "not_seen"
 
 
-def test_a_single_operation_that_was_seen_turned_is_turned_back():
-    """Its contact with the table is not blamed in its place."""
-    made = look("block_on_block", 0)
-    single = replace(made.assembly, operations=made.assembly.operations[:1])
-    about_y = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
-    turned = made.poses[:1] @ about_y
-    stated = OutlierModel(gross=0.3)
-    one = {"poses": turned, "covariance": made.covariance[:1], "observed": made.observed[:1]}
-    observation = replace(made, assembly=single, outliers=stated, **one)
-    found = correct(observation, "contact-robust")
-    assert found.ok
-    assert found.dropped == ()
-    assert "seen turned: operation 1" in found.sentence
-    assert not find_faces_away(single, made.start, found.poses).any()
-
-
 def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():
     """The stick of the last operation, left out, may lie anywhere along the slots."""
     _, layout, _ = shown("vanished_fixture", 2)
@@ -122,7 +106,7 @@ def test_a_relation_may_be_to_blame_in_place_of_an_observation():
     """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
     observation = look("vanished_fixture", 5)
     wrong = replace_contacts(
-        observation, make_contacts("shifted:10"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
+        observation, make_contacts("face-offset:10mm"), shown("vanished_fixture", 5)[1].poses, np.random.default_rng(1)
     )
     found = correct(wrong, "contact-robust")
     assert found.ok
@@ -139,7 +123,7 @@ def test_one_wrong_contact_is_left_out_and_the_others_of_its_relation_are_kept(s
     """Without the whole relation the goal would be as far off as it was seen."""
     observation = look("pocket_table", seed)
     truth = shown("pocket_table", seed)[1].poses
-    wrong = replace_contacts(observation, make_contacts("shifted:5"), truth, np.random.default_rng(seed))
+    wrong = replace_contacts(observation, make_contacts("face-offset:5mm"), truth, np.random.default_rng(seed))
     found = correct(wrong, "contact-robust")
     assert found.ok
     assert found.left_out == ()

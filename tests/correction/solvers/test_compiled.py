@@ -31,7 +31,7 @@ def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[CompactEquat
     sigma = np.repeat([mm * 1e-3, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(len(given.assembly), 1))
     twisted = np.tril(rng.normal(scale=0.2, size=(len(given.assembly), 6, 6)), -1) + np.eye(6)
     L = sigma[:, :, None] * twisted
-    goals = given.goals @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
+    goals = given.nominal_poses @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
     return build_compact_equations(build_contact_equations(given.assembly, given.start, goals), len(goals)), goals, L
 
 

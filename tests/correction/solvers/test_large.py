@@ -63,8 +63,8 @@ SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {
 def drawn(name: str, seed: int = 0) -> tuple[CompactEquations, Array, Array]:
     scene = SMALL[name][0]()
     rng = np.random.default_rng(seed)
-    L = crooked(len(scene.goals), rng)
-    seen = twisted(scene.goals, L, rng)
+    L = crooked(len(scene.nominal_poses), rng)
+    seen = twisted(scene.nominal_poses, L, rng)
     return system_of(scene, seen), seen, L
 
 
@@ -122,7 +122,7 @@ def test_what_a_sparse_matrix_leaves_free_is_what_its_singular_vectors_say(name:
 def test_the_corrector_takes_many_operations_whole() -> None:
     """What would be a dense matrix is not stated; everything else is."""
     scene = fence(400)
-    goals = twisted(scene.goals, scales(400, 1.0, 1.0), np.random.default_rng(1))
+    goals = twisted(scene.nominal_poses, scales(400, 1.0, 1.0), np.random.default_rng(1))
     made = correct(scenes.seen(scene, goals), "contact")
     assert made.ok, made.sentence
     assert made.rank == 3 + 399 * 5

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly import build_contact_equations
-from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, build_compact_equations, linearise_by
 from apo_bench.correction.solvers.gauss_newton import NearestPoses, find_nearest_poses
 from apo_bench.correction.solvers.posterior import compute_jacobian_rank
 from apo_bench.geometry import Array, pose
@@ -45,7 +45,7 @@ def correction(seen: Array, goals: Array, L: Array) -> Array:
 
 def jacobian(system: CompactEquations, found: NearestPoses) -> Array:
     """The derivative of e by z where the solver ended, (3 c, 6 n)."""
-    return np.asarray(system.gathered(system.blocks(found.poses, found.B)[1]).T)
+    return linearise_by(system, found.poses, found.B)[1].T
 
 
 def drift(J: Array, z: Array, directions: int) -> float:
@@ -58,11 +58,11 @@ def drift(J: Array, z: Array, directions: int) -> float:
 def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> None:
     """Of noise that is alike for every part, and of noise that is correlated."""
     scene = scenes.ALL[name]()
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     for seed in range(6):
         rng = np.random.default_rng(seed)
         L = crooked(n, rng) if seed % 2 else scales(n, *level)
-        seen = twisted(scene.goals, L, rng)
+        seen = twisted(scene.nominal_poses, L, rng)
         system = system_of(scene, seen)
         found = find_nearest_poses(system, seen, L)
         assert found.at_rest
@@ -72,7 +72,7 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
         assert compute_jacobian_rank(J.T) == compute_jacobian_rank(found.Jt) == RANKS[name]
         assert drift(J, found.z, RANKS[name]) <= 1e-6
         assert_allclose(found.poses, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
-        truth = correction(seen, scene.goals, L)
+        truth = correction(seen, scene.nominal_poses, L)
         assert found.z @ found.z <= truth @ truth + 1e-9
 
 
@@ -81,10 +81,10 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
     """The gradient of |z|^2 + |e / soft|^2 vanishes; contacts that are demanded hold."""
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(4)
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     for demands_of in (0.0, 0.5):
         L = crooked(n, rng)
-        seen = twisted(scene.goals, L, rng)
+        seen = twisted(scene.nominal_poses, L, rng)
         system = system_of(scene, seen)
         hard = np.repeat(rng.random(len(system)) < demands_of, 3)
         soft_m = np.where(hard, 0.0, rng.uniform(0.1e-3, 2e-3, len(hard)))

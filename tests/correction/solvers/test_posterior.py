@@ -22,7 +22,7 @@ from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, sca
 
 
 def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
-    goals = twisted(scene.goals, L, np.random.default_rng(seed))
+    goals = twisted(scene.nominal_poses, L, np.random.default_rng(seed))
     return replace(scenes.seen(scene, goals), covariance=L @ np.swapaxes(L, 1, 2))
 
 
@@ -31,9 +31,9 @@ def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
 def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(seed)
-    n = len(scene.goals)
-    L = crooked(len(scene.goals), rng, 5.0, 3.0)
-    seen = twisted(scene.goals, L, rng)
+    n = len(scene.nominal_poses)
+    L = crooked(len(scene.nominal_poses), rng, 5.0, 3.0)
+    seen = twisted(scene.nominal_poses, L, rng)
     system = system_of(scene, seen)
     found = find_nearest_poses(system, seen, L)
     known = compute_freedom(found.Jt)
@@ -52,13 +52,13 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
 def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> None:
     """Errors of corrected goals over 400 draws; what is stated to be fixed is fixed."""
     scene = scenes.ALL[name]()
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
     errors = np.zeros((400, n, 6))
     stated = np.zeros((n, 6, 6))
     for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))], contact)):
         assert made.covariance is not None
-        errors[seed] = pose.log(pose.inverse(made.poses) @ scene.goals)
+        errors[seed] = pose.log(pose.inverse(made.poses) @ scene.nominal_poses)
         stated += made.covariance / len(errors)
     empirical = np.einsum("sni,snj->nij", errors, errors) / len(errors)
     deviation = np.sqrt(np.einsum("nii->ni", stated))
@@ -83,7 +83,7 @@ def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correctio
 @pytest.mark.parametrize(("level", "low", "high"), [(0.95, 0.90, 0.99), (0.5, 0.41, 0.59)])
 def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, high: float) -> None:
     scene, seen, made = corrected_towers()
-    held = [contains_truth(one, found, scene.goals, level) for one, found in zip(seen, made, strict=True)]
+    held = [contains_truth(one, found, scene.nominal_poses, level) for one, found in zip(seen, made, strict=True)]
     assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high

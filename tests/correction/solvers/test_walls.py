@@ -32,7 +32,7 @@ def walled(scene: scenes.Scene, name: str, gap: Gap) -> Assembly:
 def in_the_play(scene: scenes.Scene, name: str, half_m: float, rng: np.random.Generator) -> Array:
     """True goals, the last part anywhere in its slot or pocket."""
     x, y = rng.uniform(-half_m, half_m, 2)
-    goals = np.array(scene.goals)
+    goals = np.array(scene.nominal_poses)
     goals[-1] = goals[-1] @ pose.at((x if name == "pockets" else 0.0, y, 0.0))
     return goals
 
@@ -80,7 +80,7 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
     """Noise of the second level is so large beside a slot of 0.2 mm that linearised walls leave no room at first."""
     scene = scenes.ALL[name]()
     half_m = 0.5e-3 * clearance_mm
-    n = len(scene.goals)
+    n = len(scene.nominal_poses)
     assembly = walled(scene, name, Gap("clearance", -half_m, half_m))
     touched = 0
     for seed in range(10):

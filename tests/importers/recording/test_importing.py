@@ -133,22 +133,6 @@ def test_a_part_that_moves_during_the_operation_of_another_is_refused() -> None:
     assert imported({**tracks, "castle1": nudged}).observation.covariance[0, 0, 0] > 0.003**2
 
 
-@pytest.mark.parametrize("put_down", [True, False])
-def test_a_part_that_a_hand_held_from_the_first_frame_starts_where_it_is_put_down_if_it_is(put_down: bool) -> None:
-    t, T = seen(NAME, 0.3)["stick"]
-    at = (CAMERA @ T[0])[:3, 3]
-    lifted = pose.at(at) @ pose.at((0.0, 0.0, 0.11), (45.0, 0.0, 0.0)) @ pose.at(-at)
-    taken = t[np.argmax(np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1) > 0.01)]
-    held = np.where((t < (0.6 if put_down else taken))[:, None, None], pose.inverse(CAMERA) @ lifted @ CAMERA @ T, T)
-    found = imported({**seen(NAME, 0.3), "stick": PoseTrack(t, held)})
-    start = found.observation.start["stick"]
-    assert found.arrangement.start_source["stick"] == ("seen" if put_down else "in the hand")
-    scenario = load_scenario(NAME)
-    planned = place_layout(scenario, 0, 0, 0, clearance_mm=scenario.clearance_mm).start["stick"]
-    assert np.allclose(start[2, 3], planned[2, 3], atol=1e-3)
-    assert put_down or np.allclose(start, planned)
-
-
 def test_a_fixed_part_is_where_it_was_seen_or_stated_though_the_assembly_stands_elsewhere() -> None:
     name = "peg_in_hole"
     scenario = load_scenario(name)

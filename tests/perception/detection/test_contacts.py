@@ -30,7 +30,7 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 
 def seen_at(scene: scenes.Scene, seed: int, noise_level: float, play_m: float = 0.0) -> Observation:
     """Goals with noise of so many mm and degrees, which are stated."""
-    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), noise_level, noise_level)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), noise_level, noise_level)
     return stated(scenes.seen(scene, goals), noise_level, play_m)
 
 
@@ -46,7 +46,7 @@ def blocks(apart_mm: float, noise_level: float) -> Observation:
     solids = [scenes.table(), scenes.block("A"), scenes.block("B")]
     operations = [Operation("A"), Operation("B")]
     scene = scenes.scene(solids, operations, [scenes.mm(0, 0, 25), scenes.mm(50 + apart_mm, 0, 25)])
-    return stated(scenes.seen(scene, scene.goals), noise_level)
+    return stated(scenes.seen(scene, scene.nominal_poses), noise_level)
 
 
 def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
@@ -118,7 +118,7 @@ def test_what_counts_as_near_follows_the_noise_up_to_a_bound() -> None:
 def test_of_contacts_that_exclude_each_other_those_are_taken_that_fit_together() -> None:
     """A cube that is seen 4.5 mm too low on a castle is nearly as near to the floor of the slot."""
     scene = scenes.subassembly_on_castles()
-    goals = np.array(scene.goals)
+    goals = np.array(scene.nominal_poses)
     goals[2, 2, 3] -= 4.5e-3
     found = detect_contacts(stated(scenes.seen(scene, goals), 2.0))
     of_cube = {str(e.contact) for e in found.evidence if e.made == 2}
@@ -127,7 +127,7 @@ def test_of_contacts_that_exclude_each_other_those_are_taken_that_fit_together()
 
 def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, FacingPair]]:
     """Faces that look at each other, between all parts at the end of a noisy demonstration."""
-    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(seed), 1.0, 1.0)
     at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     return [
@@ -144,7 +144,7 @@ def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, FacingPair]]:
 def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
     """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
     scene = scenes.ALL[name]()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(3), 1.0, 1.0)
     at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     h = 1e-6

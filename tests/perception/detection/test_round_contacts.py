@@ -50,7 +50,7 @@ def test_a_peg_beside_its_bore_is_not_in_it() -> None:
     """What counts as near follows the noise; a peg on its end has no length in common with the bore below it."""
     scene = built("loose_peg")
     for aside_mm, above_mm, within in ((0.3, 0, True), (2.5, 0, False), (0.0, 18, False)):
-        goals = np.array(scene.goals)
+        goals = np.array(scene.nominal_poses)
         goals[1, :3, 3] += [1e-3 * aside_mm, 0.0, 1e-3 * above_mm]
         recognised = detect_contacts(stated(scenes.seen(scene, goals), 0.2))
         assert any(str(e.contact) == "peg.wall on plate.bore" for e in recognised.evidence) is within
@@ -69,7 +69,7 @@ class Pair(NamedTuple):
 def pairs_of(name: str, turned_deg: float = 1.0) -> list[Pair]:
     """Those that look at each other at the end of a noisy demonstration, in both orders."""
     scene = built(name)
-    goals = scenes.noisy(scene.goals, np.random.default_rng(3), 0.5, turned_deg)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(3), 0.5, turned_deg)
     at = compute_placements(scene.assembly, scene.start, goals)[-1]
     solids = scene.assembly.solids
     faces = {part: {**solid.faces, **solid.rounds} for part, solid in solids.items()}

@@ -34,7 +34,7 @@ def see(noise: Noise, seed: int, scene: scenes.Scene = CYCLE) -> Observation:
 
 
 def twists(seen: Observation, scene: scenes.Scene = CYCLE) -> Array:
-    return pose.log(pose.inverse(scene.goals) @ seen.poses)
+    return pose.log(pose.inverse(scene.nominal_poses) @ seen.poses)
 
 
 def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
@@ -45,9 +45,9 @@ def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     turns = []
     for seed in range(600):
         goals = see(noise, seed).poses
-        F = camera.frames(CYCLE.goals)
-        offsets.append(np.einsum("nji,nj->ni", F, goals[:, :3, 3] - CYCLE.goals[:, :3, 3]))
-        w = pose.log(goals @ pose.inverse(CYCLE.goals))[:, 3:]
+        F = camera.frames(CYCLE.nominal_poses)
+        offsets.append(np.einsum("nji,nj->ni", F, goals[:, :3, 3] - CYCLE.nominal_poses[:, :3, 3]))
+        w = pose.log(goals @ pose.inverse(CYCLE.nominal_poses))[:, 3:]
         turns.append(np.einsum("nji,nj->ni", F, w))
     rms = [np.sqrt(np.mean(np.concatenate(some) ** 2, axis=0)) for some in (offsets, turns)]
     assert_allclose(rms[0] * 1e3, [0.4, 0.4, 5.0], rtol=0.05)
@@ -86,7 +86,7 @@ def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     seed = next(s for s in range(200) if not see(OutlierNoise(NOISE_LEVEL), s).observed.all())
     here = see(OutlierNoise(NOISE_LEVEL), seed)
     k = int(np.argmin(here.observed))
-    goals = CYCLE.goals.copy()
+    goals = CYCLE.nominal_poses.copy()
     goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
     there = see(OutlierNoise(NOISE_LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.poses.tobytes() == there.poses.tobytes()
@@ -100,8 +100,8 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
     size = []
     for seed in range(400):
         seen = see(ViewBiasNoise(NOISE_LEVEL), seed)
-        E = seen.poses @ pose.inverse(CYCLE.goals)
-        middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
+        E = seen.poses @ pose.inverse(CYCLE.nominal_poses)
+        middle = pose.at(CYCLE.nominal_poses[:, :3, 3].mean(axis=0))
         assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
         size.append(pose.log(pose.inverse(middle) @ E[0] @ middle))
     rms = np.sqrt(np.mean(np.array(size) ** 2, axis=0))

@@ -42,7 +42,7 @@ class Draws(NamedTuple):
 def drawn(noise: Noise, trials: int = TRIALS) -> Draws:
     demonstration = scenes.shown(CYCLE)
     observations = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(trials)]
-    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([observation.poses for observation in observations]))
+    xi = pose.log(pose.inverse(CYCLE.nominal_poses) @ np.array([observation.poses for observation in observations]))
     L = np.linalg.cholesky(np.array([observation.covariance for observation in observations]))
     seen = np.array([observation.observed for observation in observations], dtype=np.float64)
     return Draws(np.linalg.solve(L, xi[..., None])[..., 0] * seen[..., None], seen)
@@ -157,7 +157,7 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
         rng = np.random.default_rng(2)
         seen.append(observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.5 * factor, 0.75 * factor)), rng))
         after.add(rng.random())
-    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.poses) for observation in seen)
+    weak, strong = (pose.log(pose.inverse(CYCLE.nominal_poses) @ observation.poses) for observation in seen)
     assert_array_equal(seen[0].observed, seen[1].observed)
     there = seen[0].observed
     assert there.any()
@@ -173,7 +173,7 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
 def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
     for seed in range(40):
         seen = observe(scenes.shown(CYCLE), make_noise(name, NoiseLevel(0.0, 0.0)), np.random.default_rng(seed))
-        assert seen.poses.tobytes() == CYCLE.goals.tobytes()
+        assert seen.poses.tobytes() == CYCLE.nominal_poses.tobytes()
         assert seen.observed.all()
         assert_allclose(seen.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
 

@@ -72,7 +72,7 @@ def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     noise = make_noise(name, NOISE_LEVEL)
     demonstration = scenes.shown(TOWER)
     seen = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(draws)]
-    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.poses for observation in seen]))
+    xi = pose.log(pose.inverse(TOWER.nominal_poses) @ np.array([observation.poses for observation in seen]))
     L = np.linalg.cholesky(np.array([observation.covariance for observation in seen]))
     return np.linalg.solve(L, xi[..., None])[..., 0], np.array([observation.observed for observation in seen])
 
@@ -110,13 +110,14 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
         assert len(after) == 1
         assert_array_equal(seen[0].observed, seen[1].observed)
         weak, strong = (
-            pose.log(pose.inverse(TOWER.goals) @ observation.poses)[observation.observed] for observation in seen
+            pose.log(pose.inverse(TOWER.nominal_poses) @ observation.poses)[observation.observed]
+            for observation in seen
         )
         lengths = [np.linalg.norm(xi[:, :3], axis=1) for xi in (weak, strong)]
         assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
         assert_allclose(strong[:, 3:], 2.0 * weak[:, 3:], rtol=1e-6, atol=1e-12)
         none = see(names[0], seed, NoiseLevel(0.0, 0.0))
-        assert none.poses.tobytes() == TOWER.goals.tobytes()
+        assert none.poses.tobytes() == TOWER.nominal_poses.tobytes()
         assert none.observed.all()
         assert_allclose(none.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
 
@@ -144,9 +145,9 @@ def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
     found = []
     for seed in range(60):
         seen = see(f"empirical:{folder / 'whole.csv'}", seed, NoiseLevel(1.0, 1.0))
-        F = camera.frames(TOWER.goals)
-        shift = np.einsum("nji,nj->ni", F, seen.poses[:, :3, 3] - TOWER.goals[:, :3, 3]) * 1e3
-        R = seen.poses[:, :3, :3] @ np.swapaxes(TOWER.goals[:, :3, :3], 1, 2)
+        F = camera.frames(TOWER.nominal_poses)
+        shift = np.einsum("nji,nj->ni", F, seen.poses[:, :3, 3] - TOWER.nominal_poses[:, :3, 3]) * 1e3
+        R = seen.poses[:, :3, :3] @ np.swapaxes(TOWER.nominal_poses[:, :3, :3], 1, 2)
         turn = np.einsum("nji,nj->ni", F, Rotation.from_matrix(R).as_rotvec(degrees=True))
         for d, w in zip(shift[seen.observed], turn[seen.observed], strict=True):
             straight = np.abs(rows - [*d, *w]).max(axis=1).min() < 1e-6

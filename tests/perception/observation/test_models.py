@@ -29,7 +29,7 @@ def test_a_part_is_as_bad_in_every_operation() -> None:
     """The error of each operation is that of `isotropic` times the factor of the part it moves."""
     plain = see(IsotropicNoise(NOISE_LEVEL), 8)
     seen = see(PerPartNoise(NOISE_LEVEL), 8)
-    ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
+    ratio = twists(seen, TOWER.nominal_poses) / twists(plain, TOWER.nominal_poses)
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)
     rng.standard_normal((3, 6))
@@ -43,6 +43,6 @@ def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
     """Positions by the one, turns by the other, whatever frame they are drawn in."""
     sizes = []
     for noise_level in (NoiseLevel(1.0, 0.5), NoiseLevel(4.0, 1.0)):
-        xi = twists(see(make_noise(name, noise_level), 2), TOWER.goals).reshape(3, 2, 3)
+        xi = twists(see(make_noise(name, noise_level), 2), TOWER.nominal_poses).reshape(3, 2, 3)
         sizes.append(np.linalg.norm(xi, axis=2))
     assert_allclose(sizes[1] / sizes[0], np.tile([4.0, 2.0], (3, 1)), rtol=1e-6)

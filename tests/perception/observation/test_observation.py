@@ -56,7 +56,7 @@ def test_make_noise_by_name_class_function_and_object() -> None:
     assert make_noise(IsotropicNoise, noise_level) == IsotropicNoise(noise_level)
     assert make_noise(IsotropicNoise(NoiseLevel(9.0, 9.0)), noise_level) == IsotropicNoise(NoiseLevel(9.0, 9.0))
     assert make_noise(plain, noise_level) is plain
-    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.goals)
+    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).poses, TOWER.nominal_poses)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_what_make_noise_refuses(given: object, noise_level: NoiseLevel, message
     assert message in str(refused.value)
 
 
-GOOD = scenes.seen(TOWER, TOWER.goals)
+GOOD = scenes.seen(TOWER, TOWER.nominal_poses)
 SKEWED = GOOD.covariance.copy()
 SKEWED[1, 0, 1] = 1e-7
 
@@ -80,8 +80,8 @@ SKEWED[1, 0, 1] = 1e-7
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
-        (replace(GOOD, poses=1.1 * TOWER.goals), "pose of operation 1 that is not rigid"),
+        (scenes.seen(scenes.stick_in_tower(), TOWER.nominal_poses), "changed the assembly"),
+        (replace(GOOD, poses=1.1 * TOWER.nominal_poses), "pose of operation 1 that is not rigid"),
     ],
 )
 def test_what_observe_refuses(returned: object, message: str) -> None:

@@ -36,13 +36,13 @@ def with_deviations(function, mm: object, deg: object):
 
 @pytest.mark.parametrize("wrap", [lambda: with_deviations(lifted, 2.0, 0.5), lambda: Plain(lifted, 2.0, 0.5)])
 def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
-    before = TOWER.goals.copy()
+    before = TOWER.nominal_poses.copy()
     seen = observe(SHOWN, make_noise(wrap(), NOISE_LEVEL), np.random.default_rng(4))
     up = np.random.default_rng(4).uniform(1e-3, 2e-3, 3)
-    assert_allclose(seen.poses[:, 2, 3] - TOWER.goals[:, 2, 3], up, atol=1e-15)
+    assert_allclose(seen.poses[:, 2, 3] - TOWER.nominal_poses[:, 2, 3], up, atol=1e-15)
     assert_allclose(seen.covariance, np.tile(np.diag(np.repeat([2e-3, np.radians(0.5)], 3) ** 2), (3, 1, 1)))
     assert seen.observed.all()
-    assert_array_equal(TOWER.goals, before)
+    assert_array_equal(TOWER.nominal_poses, before)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import Assembly
 from apo_bench.assembly import Contact
-from apo_bench.perception.observation.wrong_contacts import Shifted, culprit, false, missed
+from apo_bench.perception.observation.wrong_contacts import FaceOffset, add_contact, culprit, omit_contact
 from tests import rounds
 from tests.brackets import on_pins
 
@@ -22,12 +22,12 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 def test_exactly_one_contact_is_wrong(name: str) -> None:
     scene = SCENES[name]()
     right = contacts(scene.assembly)
-    arguments = (scene.assembly, scene.start, scene.goals)
+    arguments = (scene.assembly, scene.start, scene.nominal_poses)
     for seed in range(4):
-        assert len(right - contacts(missed(*arguments, np.random.default_rng(seed)))) == 1
-        off = contacts(Shifted()(*arguments, np.random.default_rng(seed)))
+        assert len(right - contacts(omit_contact(*arguments, np.random.default_rng(seed)))) == 1
+        off = contacts(FaceOffset()(*arguments, np.random.default_rng(seed)))
         assert (len(off), len(right - off)) == (len(right), 1)
-        more = contacts(false(*arguments, np.random.default_rng(seed)))
+        more = contacts(add_contact(*arguments, np.random.default_rng(seed)))
         assert more >= right
         assert len(more - right) <= 1
 
@@ -36,7 +36,7 @@ def test_a_round_face_is_off_across_its_axis() -> None:
     scene = rounds.through()
     seen = set[str]()
     for seed in range(12):
-        wrong = Shifted(2e-3)(scene.assembly, scene.start, scene.goals, np.random.default_rng(seed))
+        wrong = FaceOffset(2e-3)(scene.assembly, scene.start, scene.nominal_poses, np.random.default_rng(seed))
         ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
         part, face = contact.environment
         seen.add(face)

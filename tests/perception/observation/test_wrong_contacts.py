@@ -13,11 +13,11 @@ from apo_bench.assembly import Contact, build_contact_equations, build_relation_
 from apo_bench.perception.observation.wrong_contacts import (
     NEAR_FACES_M,
     TOUCHING_M,
-    Shifted,
+    FaceOffset,
+    add_contact,
     culprit,
-    false,
     make_contacts,
-    missed,
+    omit_contact,
     replace_contacts,
 )
 from apo_bench.trial.stages import CONTACT_SOURCE, stream
@@ -32,7 +32,7 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 
 def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
     """The largest |e| of each contact at the truth, [m]."""
-    return build_contact_equations(assembly, scene.start, scene.goals).gaps(scene.goals)
+    return build_contact_equations(assembly, scene.start, scene.nominal_poses).gaps(scene.nominal_poses)
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
@@ -40,14 +40,14 @@ def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
 def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
     right = contacts(scene.assembly)
-    arguments = (scene.assembly, scene.start, scene.goals)
-    less = contacts(missed(*arguments, stream(seed, CONTACT_SOURCE)))
+    arguments = (scene.assembly, scene.start, scene.nominal_poses)
+    less = contacts(omit_contact(*arguments, stream(seed, CONTACT_SOURCE)))
     assert less < right
     assert len(right - less) == 1
-    off = contacts(Shifted()(*arguments, stream(seed, CONTACT_SOURCE)))
+    off = contacts(FaceOffset()(*arguments, stream(seed, CONTACT_SOURCE)))
     assert len(off) == len(right)
     assert len(right - off) == 1
-    more = contacts(false(*arguments, stream(seed, CONTACT_SOURCE)))
+    more = contacts(add_contact(*arguments, stream(seed, CONTACT_SOURCE)))
     assert more > right
     assert len(more - right) == 1
 
@@ -56,7 +56,7 @@ def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_shifted_face_is_off_by_its_size_and_every_other_contact_holds(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
-    wrong = Shifted(3e-3)(scene.assembly, scene.start, scene.goals, stream(seed, CONTACT_SOURCE))
+    wrong = FaceOffset(3e-3)(scene.assembly, scene.start, scene.nominal_poses, stream(seed, CONTACT_SOURCE))
     off = gaps(wrong, scene)
     accused = [r.contact not in scene.assembly.operations[r.made].contacts for r in wrong.relations()]
     assert_allclose(off[accused], 3e-3, atol=1e-12)
@@ -68,13 +68,13 @@ def test_a_false_contact_is_plausible(name: str) -> None:
     """It joins a moved part and one that stands there; their faces are apart, and where a scenario has them, near."""
     s = load_scenario(name)
     for seed in SEEDS:
-        wrong = false(s.assembly, s.start, s.goals, stream(seed, CONTACT_SOURCE))
+        wrong = add_contact(s.assembly, s.start, s.nominal_poses, stream(seed, CONTACT_SOURCE))
         ((made, contact),) = contacts(wrong) - contacts(s.assembly)
         before = {part for operation in s.assembly.operations[:made] for part in operation.moves}
         assert contact.manipulated.part in s.assembly.operations[made].moves
         assert contact.environment.part in s.assembly.fixed | before
-        system = build_contact_equations(wrong, s.start, s.goals)
-        apart = system.gaps(s.goals)[[r.contact == contact and r.made == made for r in wrong.relations()]]
+        system = build_contact_equations(wrong, s.start, s.nominal_poses)
+        apart = system.gaps(s.nominal_poses)[[r.contact == contact and r.made == made for r in wrong.relations()]]
         assert apart > TOUCHING_M
         if name in ("carried_bridge", "pocket_table"):
             assert apart < NEAR_FACES_M
@@ -82,12 +82,12 @@ def test_a_false_contact_is_plausible(name: str) -> None:
 
 def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
     scene = scenes.stick_in_tower()
-    arguments = (scene.assembly, scene.start, scene.goals)
+    arguments = (scene.assembly, scene.start, scene.nominal_poses)
     for seed in SEEDS:
-        assert culprit(scene.assembly, missed(*arguments, stream(seed, CONTACT_SOURCE))) is None
+        assert culprit(scene.assembly, omit_contact(*arguments, stream(seed, CONTACT_SOURCE))) is None
         for wrong in (
-            false(*arguments, stream(seed, CONTACT_SOURCE)),
-            Shifted()(*arguments, stream(seed, CONTACT_SOURCE)),
+            add_contact(*arguments, stream(seed, CONTACT_SOURCE)),
+            FaceOffset()(*arguments, stream(seed, CONTACT_SOURCE)),
         ):
             ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
             (arc,) = [arc for arc in build_relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
@@ -97,20 +97,20 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
 
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
     assert make_contacts("given") is None
-    assert make_contacts("false-negative") is missed
-    assert make_contacts("apo_bench.perception.observation.wrong_contacts:false") is false
-    assert make_contacts("shifted:3") == Shifted(3e-3)
-    assert make_contacts(Shifted(1e-3)) == Shifted(1e-3)
+    assert make_contacts("false-negative") is omit_contact
+    assert make_contacts("apo_bench.perception.observation.wrong_contacts:false") is add_contact
+    assert make_contacts("face-offset:3mm") == FaceOffset(3e-3)
+    assert make_contacts(FaceOffset(1e-3)) == FaceOffset(1e-3)
 
 
 def test_relations_change_nothing_but_contacts_and_faces() -> None:
     scene = scenes.stick_in_tower()
-    seen = scenes.seen(scene, scene.goals)
+    seen = scenes.seen(scene, scene.nominal_poses)
     for returned, words in (
         (None, "returned NoneType; return an Assembly"),
         (scene.assembly.first(2), "changed parts or operations"),
         (replace(scene.assembly, solids={"table": scenes.table()}), "changed parts or operations"),
     ):
         with pytest.raises(InputError) as refused:
-            replace_contacts(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
+            replace_contacts(seen, lambda *_, r=returned: r, scene.nominal_poses, np.random.default_rng(0))
         assert words in str(refused.value)

@@ -26,11 +26,11 @@ def built(name: str) -> Scene:
 
 @lru_cache
 def last_of(made: Scene) -> OperationMacros:
-    return understand(made.assembly, made.start, made.goals)[-1]
+    return understand(made.assembly, made.start, made.nominal_poses)[-1]
 
 
 def poses_of(made: Scene) -> dict[str, Array]:
-    return dict(compute_placements(made.assembly, made.start, made.goals)[-1])
+    return dict(compute_placements(made.assembly, made.start, made.nominal_poses)[-1])
 
 
 def told(found: Arrival) -> list[tuple[str, list[float]]]:
@@ -86,12 +86,12 @@ def test_a_wedge_is_slid_under_its_roof(turned: bool) -> None:
     made = under_roof(30.0)
     (operation,) = made.assembly.operations
     contacts = operation.contacts[::-1] if turned else operation.contacts
-    found = arrive(made.assembly, ("wedge",), contacts, made.start | {"wedge": made.goals[0]})
+    found = arrive(made.assembly, ("wedge",), contacts, made.start | {"wedge": made.nominal_poses[0]})
     assert (found.state.letter, found.free) == ("C", True)
     in_ = [0.0, -1.0, 0.0] if found.macros[1].direction[1] < 0 else [0.0, 1.0, 0.0]
     assert told(found) == [("move-to-contact", DOWN), ("slide-to-contact", in_)]
     assert found.line.direction.tolist() == pytest.approx(in_, abs=1e-9)
-    (side,) = slide_directions(made.assembly, found, made.start | {"wedge": made.goals[0]})
+    (side,) = slide_directions(made.assembly, found, made.start | {"wedge": made.nominal_poses[0]})
     assert side == pytest.approx(in_, abs=1e-9)
     roof = made.start["roof"][:3, :3] @ made.assembly.solids["roof"].faces["slope"].normal
     assert roof @ in_ < 0.0, "towards the roof"

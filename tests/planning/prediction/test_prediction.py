@@ -28,7 +28,7 @@ ALONG = (1.0, 0.0, 0.0)
 def ways(scene: scenes.Scene) -> list[Attach]:
     """From above in the world; a stick that goes through holes, along its own x axis."""
     made = []
-    for operation, goal in zip(scene.assembly.operations, scene.goals, strict=True):
+    for operation, goal in zip(scene.assembly.operations, scene.nominal_poses, strict=True):
         holes = [c for c in operation.contacts if c.manipulated.part == "stick" and c.manipulated.face == "pz"]
         upright = goal[2, 2] > 0
         made.append(Attach(np.array(ALONG), 0.2) if holes else Attach(np.array(DOWN if upright else AWAY), 0.05))
@@ -42,14 +42,14 @@ def said(scene: scenes.Scene, goals: Array, attach: Sequence[Attach] | None = No
 
 def off(scene: scenes.Scene, operation: int, T: Array) -> Array:
     """The true goals, that of one operation (from 1) wrong by a body displacement."""
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[operation - 1] = goals[operation - 1] @ T
     return goals
 
 
 @pytest.mark.parametrize("name", scenes.ALL)
 def test_the_examples_of_the_paper_fit(name: str) -> None:
-    found = said(scenes.ALL[name](), scenes.ALL[name]().goals)
+    found = said(scenes.ALL[name](), scenes.ALL[name]().nominal_poses)
     assert (found.fails, found.operation, found.code) == (False, None, "ok")
     assert found.size_mm == pytest.approx(0.0, abs=1e-9)
 
@@ -69,7 +69,7 @@ def test_careless_placing_fails_where_the_paper_says(
 ) -> None:
     """Fig. 3 and 6, examples 5.1 to 5.3: one part 2 mm aside, seen exactly; everything before still fits."""
     scene = scenes.ALL[name]()
-    goals = scene.goals.copy()
+    goals = scene.nominal_poses.copy()
     goals[[k - 1 for k in wrong]] = goals[[k - 1 for k in wrong]] @ scenes.mm(*shift)
     found = said(scene, goals)
     assert (found.fails, found.operation, found.code) == (True, fails - 1, "residual")
@@ -81,7 +81,7 @@ def test_careless_placing_fails_where_the_paper_says(
 def test_what_is_found_by_touch_tells_nothing(mm: float) -> None:
     """Too deep or too high: a support is no fit contact, and the floor of a slot lies along the way in."""
     scene = scenes.stick_on_castles()
-    assert said(scene, scene.goals @ scenes.mm(0, 0, mm)).code == "ok"
+    assert said(scene, scene.nominal_poses @ scenes.mm(0, 0, mm)).code == "ok"
     laid = off(scene, 3, scenes.mm(0, 0, mm))
     assert said(scene, laid).code == "ok"
     assert (said(scene, laid, []).code, said(scene, laid, []).operation) == ("residual", 2)
@@ -92,7 +92,7 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
     """Supports close, of sides one corner, and settling again changes nothing."""
     scene = scenes.ALL[name]()
     poses = dict(scene.start)
-    goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
+    goals = scenes.noisy(scene.nominal_poses, np.random.default_rng(4), 1.0, 1.0)
     for operation, goal in zip(scene.assembly.operations, goals, strict=True):
         alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
         (brought,) = compute_placements(alone, poses, goal[None])
@@ -117,8 +117,8 @@ def test_work_that_is_taken_apart_is_looked_at_as_it_is_redone() -> None:
     scene = scenes.stick_in_tower()
     wrong = off(scene, 2, scenes.mm(0, 3, 0))
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
-    targets = np.array([scene.goals[0], wrong[1], wrong[1], scene.goals[1], scene.goals[2]])
-    assert said(scene, scene.goals, schedule=schedule, step_poses=targets).code == "ok"
+    targets = np.array([scene.nominal_poses[0], wrong[1], wrong[1], scene.nominal_poses[1], scene.nominal_poses[2]])
+    assert said(scene, scene.nominal_poses, schedule=schedule, step_poses=targets).code == "ok"
     targets[3] = wrong[1]
     found = said(scene, wrong, schedule=schedule, step_poses=targets)
     assert (found.operation, found.code) == (2, "residual")
@@ -147,7 +147,7 @@ def round_ways(name: str) -> list[Attach]:
 @pytest.mark.parametrize("name", rounds.ALL)
 def test_round_and_tilted_parts_fit(name: str) -> None:
     scene = rounds.ALL[name]()
-    found = said(scene, scene.goals, round_ways(name))
+    found = said(scene, scene.nominal_poses, round_ways(name))
     assert (found.fails, found.code) == (False, "ok")
     assert found.size_mm == pytest.approx(0.0, abs=1e-6)
 
@@ -179,13 +179,13 @@ def test_round_and_tilted_parts_that_are_planned_wrongly(
 def by_arm(k: int, **made: object) -> Prediction:
     """The true goals of the stick in the tower, one operation of which an arm does like this."""
     scene = scenes.ALL["stick_in_tower"]()
-    plan = Plan(scene.assembly, scene.start, scene.goals)
-    moves = [ArmMove(i, **(made if i == k else {})) for i in range(len(scene.goals))]
+    plan = Plan(scene.assembly, scene.start, scene.nominal_poses)
+    moves = [ArmMove(i, **(made if i == k else {})) for i in range(len(scene.nominal_poses))]
     return predict(plan, CLEARANCE_MM, Thresholds(), ways(scene), moves)
 
 
 def test_what_an_arm_cannot_do_is_foretold() -> None:
-    last = len(scenes.ALL["stick_in_tower"]().goals) - 1
+    last = len(scenes.ALL["stick_in_tower"]().nominal_poses) - 1
     assert by_arm(last).code == "ok"
     short = by_arm(last, refused="unreachable", at_limit="j4")
     assert (short.operation, short.code, short.size_mm) == (last, "unreachable", None)

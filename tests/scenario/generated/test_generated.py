@@ -78,7 +78,7 @@ def test_ways_are_free(scenario: Scenario) -> None:
 def test_its_contacts_are_those_that_touch(scenario: Scenario) -> None:
     """Those that stand at the end are what `drafting` finds there."""
     assembly = scenario.assembly
-    end = compute_placements(assembly, scenario.start, scenario.goals)[-1]
+    end = compute_placements(assembly, scenario.start, scenario.nominal_poses)[-1]
     said = {frozenset(each.contact) for each in assembly.relations() if each.lost is None}
     touching = {frozenset(contact) for contact in find_contacts(assembly.solids, end)}
     assert said == {pair for pair in touching if not {each.part for each in pair} <= assembly.fixed}

@@ -67,7 +67,7 @@ def effort_table(lines: Sequence[Line]) -> Table:
             TableColumn("trials", "right"),
             TableColumn("extra_steps", "extra steps", text="{extra_steps:.1f}"),
             TableColumn("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
-            TableColumn("displaced_mm", "pushed at most", text="{displaced_mm:.2f} mm"),
+            TableColumn("placed_part_shift_mm", "pushed at most", text="{placed_part_shift_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
