@@ -57,7 +57,8 @@ def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assemb
     for part, known in intervals.items():
         pauses = [f"{each.begins:.2f} s" for each in known[1:] if each not in arrangement.order.intervals]
         if pauses and part not in carried:
-            yield f"'{part}' also rested at {', '.join(pauses)}, counted as pauses; state --operation-ends if it was put down"
+            times = ", ".join(pauses)
+            yield f"'{part}' also rested at {times}, counted as pauses; state --operation-ends if it was put down"
 
 
 def _hidden(intervals: RestIntervals) -> Iterator[str]:
