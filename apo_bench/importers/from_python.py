@@ -30,8 +30,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
         >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
         ['plate.xml']
     """
-    from apo_bench.importers.cad.importing import import_solid as write_part
-    from apo_bench.importers.cad.importing import raw_solids
+    from apo_bench.importers.cad.importing import import_solid, raw_solids
     from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
@@ -39,7 +38,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
     written: dict[str, Path] = {}
     for raw in raw_solids(source, unit)[1]:
         name = make_part_name(raw.name, set(written))
-        written[name] = write_part(raw, name, target, source.name).path
+        written[name] = import_solid(raw, name, target, source.name).path
     return tuple(written.values())
 
 
@@ -85,7 +84,7 @@ def import_assembly(
         >>> [operation.main for operation in scenario.assembly.operations]
         ['block']
     """
-    from apo_bench.importers.assembly.from_cad import import_parts as write_parts
+    from apo_bench.importers.assembly.from_cad import import_parts, remove_on_failure
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
 
     sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
@@ -93,18 +92,19 @@ def import_assembly(
     target = Path(f"{sources[0].stem}.toml") if out is None else Path(out)
     require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
     require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
-    poses, _ = write_parts(sources, target.with_name(f"{target.stem}_parts"), unit)
-    scenario_from_poses(
-        poses,
-        (),
-        target,
-        ", ".join(source.name for source in sources),
-        up=up,
-        fixed=fixed,
-        order=order,
-        clearance_mm=clearance_mm,
-        max_overlap_mm=max_overlap_mm,
-    )
+    with remove_on_failure(target.with_name(f"{target.stem}_parts")) as folder:
+        poses, _ = import_parts(sources, folder, unit)
+        scenario_from_poses(
+            poses,
+            (),
+            target,
+            ", ".join(source.name for source in sources),
+            up=up,
+            fixed=fixed,
+            order=order,
+            clearance_mm=clearance_mm,
+            max_overlap_mm=max_overlap_mm,
+        )
     return load_scenario(target)
 
 
