@@ -1,4 +1,4 @@
-"""Names of methods: a corrector, or a plan without one, and what the robot does."""
+"""Names of methods."""
 
 from types import MappingProxyType
 from typing import Any, NamedTuple
