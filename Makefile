@@ -51,6 +51,7 @@ site: $(VENV)/.installed-dev
 style: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 
 contracts: $(VENV)/.installed-dev
 	$(BIN)/lint-imports --no-logo --no-cache

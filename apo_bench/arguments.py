@@ -7,13 +7,14 @@ themselves.
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import wraps
+from inspect import CO_VARKEYWORDS
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from apo_bench.errors import ArgumentError, add_article, shown
+from apo_bench.errors import ArgumentError, add_article, shown, unknown
 
 Public = TypeVar("Public", bound=Callable[..., Any])
 
@@ -34,14 +35,17 @@ class _Type(NamedTuple):
 def check_arguments(public: Public) -> Public:
     """Make a function, or the constructor of a class, check its arguments against its annotations.
 
-    Annotations are read at the first call. Python itself refuses an argument that is missing or unknown.
+    Annotations are read at the first call. Python itself refuses an argument that is missing.
 
     Raises:
-        ArgumentError: When called with an argument of another type.
+        ArgumentError: When called with an argument of another type, or with an unknown keyword.
     """
     function: Any = vars(public)["__init__"] if isinstance(public, type) else public
     called = public.__qualname__.removesuffix(".__call__")
-    positional = function.__code__.co_varnames[: function.__code__.co_argcount]
+    code = function.__code__
+    positional = code.co_varnames[: code.co_argcount]
+    keywords = frozenset(code.co_varnames[code.co_posonlyargcount : code.co_argcount + code.co_kwonlyargcount])
+    takes_any = bool(code.co_flags & CO_VARKEYWORDS)
     types: dict[str, _Type] = {}
 
     def take(name: str, value: Any) -> Any:
@@ -58,6 +62,9 @@ def check_arguments(public: Public) -> Public:
     def checked(*given: Any, **named: Any) -> Any:
         if not types:
             types.update({name: _read(hint) for name, hint in get_type_hints(function, include_extras=True).items()})
+        if not takes_any and not named.keys() <= keywords:
+            name = next(name for name in named if name not in keywords)
+            raise ArgumentError(unknown(f"argument of {called}", name, keywords - {"self"}))
         values = (*map(take, positional, given), *given[len(positional) :])
         return function(*values, **{name: take(name, value) for name, value in named.items()})
 

@@ -17,6 +17,7 @@ from apo_bench.assembly import Correction, Observation
 from apo_bench.benchmark.scoring.track import read_track
 from apo_bench.benchmark.sweeps.grid import SweepConfig, load_all, units
 from apo_bench.errors import require
+from apo_bench.io import format_count
 from apo_bench.records import CORRECTOR, TrialConfig
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash
@@ -77,7 +78,9 @@ def sequential_test(
     passed = evidence > 0.0
     verdict = f"it is at least {at_least:g}" if passed else f"it is below {at_least:g}"
     undecided = f", though it is not decided after {trials}" * (abs(evidence) < bound)
-    return Decision(passed, successes, trials, f"{successes} of {trials} trials succeeded: {verdict}{undecided}")
+    return Decision(
+        passed, successes, trials, f"{successes} of {format_count(trials, 'trial')} succeeded: {verdict}{undecided}"
+    )
 
 
 @check_arguments

@@ -19,9 +19,9 @@ one sentence on standard error; 128 and the number of the signal where a signal 
 `apo-bench --install-completion` lets bash, zsh and fish complete commands, options, and names of scenarios, methods,
 noise models and arms when Tab is pressed.
 
-In place of a name, `package.module:name` names something of your own. The module may lie in the current
-folder; nothing else there is imported. `python -m apo_bench` is started by Python, which takes some of its own modules
-from the current folder first; `apo-bench` and `python -P -m apo_bench` do not.
+In place of a name, `package.module:name` names your code. The module may be in the current folder; nothing else
+there is imported. `python -m apo_bench` lets Python look for its modules in the current folder first; `apo-bench` and
+`python -P -m apo_bench` do not.
 """
 
 

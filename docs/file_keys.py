@@ -213,35 +213,8 @@ All keys of the files that you can write. In TOML files lengths are in mm and an
 always in MJCF, lengths are in metres. The reader rejects a key that is not listed, with the nearest one. *Needed*: the
 reader rejects a file without it.
 """
-Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
-"""Table -> keys that are needed, keys that are allowed."""
-
-
-def page() -> str:
-    """The page, as Markdown."""
-    found = {
-        "Scenario files": scenario_keys(),
-        "Noise files": noise_keys(),
-        "TOML files of parts": face_keys(),
-        "Sweep files": sweep_keys(),
-    }
-    lines = [HEAD]
-    for file, tables in MEANINGS.items():
-        explained = {t: set(keys) for t, keys in tables.items()}
-        known = {t: set(k[1]) for t, k in found[file].items()}
-        if explained != known:
-            raise ValueError(f"docs/file_keys.py explains {explained} of {file}, but the package reads {known}.")
-        lines += ["", f"## {file}"]
-        for table, keys in tables.items():
-            needed = found[file][table][0]
-            lines += ["", f"### `{table}`" if table else "### At the top", ""]
-            lines += ["| key | needed | meaning |", "|---|---|---|"]
-            lines += [f"| `{key}` | {'yes' if key in needed else ''} | {means} |" for key, means in keys.items()]
-    return "\n".join([*lines, PART_LINES.rstrip(), *arm_lines()]) + "\n"
-
-
-def scenario_keys() -> Keys:
-    types = {
+TYPES: Mapping[str, Mapping[str, type[msgspec.Struct]]] = {
+    "Scenario files": {
         "": scenario_tables.ScenarioTable,
         "parts.NAME": scenario_tables.PartTable,
         "pose: start, goal": Pose,
@@ -253,38 +226,41 @@ def scenario_keys() -> Keys:
         "site": scenario_tables.SiteTable,
         "human_error": scenario_tables.HumanErrorTable,
         "judge": scenario_tables.JudgeTable,
-    }
-    return {table: keys_of(of) for table, of in types.items()}
-
-
-def face_keys() -> Keys:
-    types = {
+    },
+    "Noise files": {"": noise_file.NoiseFileTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable},
+    "TOML files of parts": {
         "": stated.MatterTable,
         "faces.NAME, a plane": stated.PlaneTable,
         "faces.NAME, a cylinder": stated.CylinderTable,
         "faces.NAME, a cone": stated.ConeTable,
         "faces.NAME, a rim": stated.RimTable,
-    }
-    return {table: keys_of(of) for table, of in types.items()}
+    },
+    "Sweep files": {"": SweepTable},
+}
+"""File -> table -> the type whose fields are its keys."""
 
 
-def keys_of(table: type[msgspec.Struct]) -> tuple[frozenset[str], frozenset[str]]:
-    """The keys of a type that are needed, and all that are allowed."""
+def page() -> str:
+    """The page, as Markdown."""
+    lines = [HEAD]
+    for file, tables in MEANINGS.items():
+        lines += ["", f"## {file}"]
+        for table, meanings in tables.items():
+            lines += ["", f"### `{table}`" if table else "### At the top", "", *key_lines(TYPES[file][table], meanings)]
+    return "\n".join([*lines, PART_LINES.rstrip(), ARM_LINES.rstrip(), *arm_lines()]) + "\n"
+
+
+def key_lines(table: type[msgspec.Struct], meanings: Mapping[str, str]) -> list[str]:
+    """The keys of a table and what they mean, in Markdown."""
     fields = msgspec.structs.fields(table)
     tag = table.__struct_config__.tag_field
     kind = set() if tag is None else {tag}
-    return frozenset({field.encode_name for field in fields if field.required} | kind), frozenset(
-        {field.encode_name for field in fields} | kind
-    )
-
-
-def noise_keys() -> Keys:
-    types = {"": noise_file.NoiseFileTable, "shift": noise_file.ShiftTable, "turn": noise_file.TurnTable}
-    return {table: keys_of(of) for table, of in types.items()}
-
-
-def sweep_keys() -> Keys:
-    return {"": keys_of(SweepTable)}
+    needed = {field.encode_name for field in fields if field.required} | kind
+    known = {field.encode_name for field in fields} | kind
+    if meanings.keys() != known:
+        raise ValueError(f"docs/file_keys.py explains {set(meanings)}, but {table.__name__} has {known}.")
+    lines = (f"| `{key}` | {'yes' if key in needed else ''} | {means} |" for key, means in meanings.items())
+    return ["| key | needed | meaning |", "|---|---|---|", *lines]
 
 
 PART_LINES = """
@@ -303,32 +279,33 @@ also as `<default>`:
 | `<site>` | of parts of boxes alone: `name` of the face on which it lies, `pos`; `class="fit"`: the face recedes |
 | `<mesh>` | `name`, and `vertex`, or `file` of a picture in the folder of the part |
 
-A part has no joints, actuators, sensors, included files or plugins, no second body, and no pose or inertia of its own.
+A part has no joints, actuators, sensors, included files or plugins, no second body, and no stated pose or inertia.
+"""
+
+
+ARM_LINES = """
+## Arms
+
+[A file](../guide/arm.md#a-file-that-describes-an-arm) describes any arm. An arm is data also in Python: `--arm
+mymodule:my_arm`, where `my_arm` is an `apo_bench.Arm` or a function that returns one. The site `tip` lies between the
+fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example.
+
+| field | meaning |
+|---|---|
 """
 
 
 def arm_lines() -> list[str]:
     """The fields of `Arm`, with the sentences below them."""
-    lines = [
-        "",
-        "## Arms",
-        "",
-        "[A file](../guide/arm.md#a-file-that-describes-an-arm) describes any arm. An arm is data also in",
-    ]
-    lines[-1] += " Python: `--arm mymodule:my_arm`, where `my_arm` is an"
-    lines[-1] += " `apo_bench.Arm` or a function that returns one. The site `tip` lies between the"
-    lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
-    lines += ["", "| field | meaning |", "|---|---|"]
     explained = OBVIOUS | sentences(Arm)
-    lines += [f"| `{field.name}` | {explained[field.name]} |" for field in dataclasses.fields(Arm)]
-    return lines
+    return [f"| `{field.name}` | {explained[field.name]} |" for field in dataclasses.fields(Arm)]
 
 
 OBVIOUS = {
     "mjcf": "The file that describes the arm.",
     "tip": "Name of the site between the fingertips.",
 }
-"""Fields of an arm that have no sentence of their own."""
+"""Fields of an arm without a sentence in the code."""
 
 if __name__ == "__main__":
     sys.stdout.write(page())

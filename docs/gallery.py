@@ -1,7 +1,8 @@
-"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (two minutes)."""
+"""Draw finished assemblies, of every scenario and of every generated family: `python docs/gallery.py` (a minute)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,23 +14,23 @@ import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly import Assembly, compute_placements
 from apo_bench.formats.kit import make_part_mesh
 from apo_bench.geometry import Array, Solid, build_union_mesh, shrink_pieces
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.scenario.file import list_scenario_names, load_scenario
+from apo_bench.scenario.generated.families import FAMILIES
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene.render import aim_camera
-from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import simulate_demonstration
 
 SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
+GENERATED = SHEET.with_name("generated_grid.png")
 SIZE = (1200, 960)  # rendered at this size, and reduced on the sheet
-COLUMNS = 5
-SEED = 0
+SEED = 1  # of generated assemblies
 AZIMUTH_DEG = {"wedge_under_roof": -35.0}  # of the camera, where not 128
 ELEVATION_DEG = -34.0
 FILLED = 0.86  # share of the picture that the assembly fills, in width or height
@@ -38,35 +39,40 @@ STEEL = (0.55, 0.57, 0.60)  # of parts without a colour
 
 
 def main() -> None:
-    names = list_scenario_names()
-    figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.2), layout="constrained")
+    draw_sheet({name: load_scenario(name) for name in list_scenario_names()}, 5, SHEET)
+    generated = {family: load_scenario(f"generated:{family}:{SEED}") for family in FAMILIES}
+    draw_sheet(generated, 4, GENERATED)
+
+
+def draw_sheet(scenarios: Mapping[str, Scenario], columns: int, path: Path) -> None:
+    """Draw finished assemblies in rows, each with its name."""
+    rows = -(-len(scenarios) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(2.6 * columns, 2.4 * rows), layout="constrained")
     for axis in axes.flat:
         axis.axis("off")
-    for axis, name in zip(axes.flat, names, strict=False):
-        axis.imshow(finished(name), interpolation="antialiased", interpolation_stage="rgba")
+    for axis, (name, scenario) in zip(axes.flat, scenarios.items(), strict=False):
+        axis.imshow(finished(scenario), interpolation="antialiased", interpolation_stage="rgba")
         axis.set_title(name, fontsize=13, fontweight="bold", pad=5)
-    figure.savefig(SHEET, dpi=110, pil_kwargs={"optimize": True})
+    figure.savefig(path, dpi=110)
     plt.close(figure)
+    Image.open(path).convert("RGB").quantize(255, Image.Quantize.MEDIANCUT).save(path, optimize=True)
 
 
-def finished(name: str) -> NDArray[np.uint8]:
+def finished(scenario: Scenario) -> NDArray[np.uint8]:
     """Return a picture of the finished assembly, as large as it fits; each part is one mesh, without inner faces."""
-    scenario = load_scenario(name)
-    demonstration = simulate_demonstration(build_scene(scenario), 0.0, SEED).demonstration
     assembly = scenario.assembly
-    poses = {part: demonstration.final.get(part, scenario.start[part]) for part in assembly.solids}
+    poses = {**scenario.start, **compute_placements(assembly, scenario.start, scenario.nominal_poses)[-1]}
     spec = mujoco.MjSpec.from_file(str(folder("assets") / "room.xml"))
     for part, solid in assembly.solids.items():
         add_part(spec, part, solid, scenario, poses[part])
     model = spec.compile()
     model.vis.headlight.ambient[:] = 0.4
     model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
-    used = sorted(assembled(demonstration.assembly))
-    corners = np.concatenate([corners_of(assembly.solids[part], poses[part]) for part in used])
+    corners = np.concatenate([corners_of(assembly.solids[part], poses[part]) for part in sorted(assembled(assembly))])
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     with renderer(model, *SIZE) as draws:
-        draws.update_scene(data, camera=fit_camera(corners, AZIMUTH_DEG.get(name, 128.0), model))
+        draws.update_scene(data, camera=fit_camera(corners, AZIMUTH_DEG.get(scenario.name, 128.0), model))
         return np.array(draws.render())
 
 

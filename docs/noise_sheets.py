@@ -32,7 +32,7 @@ errors of one model with percentiles, and [a function of yours](../guide/noise.m
 
 A noise model draws an observation of the true poses: for each operation a pose with an error, the stated covariance,
 and whether it was observed. One seed gives comparable errors at every [noise level](glossary.md#noise-level) L, which
-only scales the random numbers. At level 0 the models without measured errors are exact. The stated covariance also
+only scales the random numbers. At level 0 every model is exact. The stated covariance also
 has the mean square of the human error, and is at least 0.05 mm and 0.05 degrees.
 
 ## Errors and corrections

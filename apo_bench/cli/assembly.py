@@ -44,10 +44,11 @@ def assembly_import(
       apo-bench assembly import jig.step --out jig.toml
       apo-bench assembly import base.step key.step pin.step --order key,pin --out clamp.toml
     """
-    from apo_bench.importers.assembly.from_cad import import_parts
+    from apo_bench.importers.assembly.from_cad import import_parts, remove_on_failure
 
     check_output(out, "--out", ".toml", new=not overwrite)
-    poses, lines = import_parts(files, out.with_name(f"{out.stem}_parts"), unit)
-    typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
-    source = ", ".join(file.name for file in files)
-    write_new_scenario(poses, [], source, out, (up, fixed, order, clearance_mm, max_overlap_mm))
+    with remove_on_failure(out.with_name(f"{out.stem}_parts")) as folder:
+        poses, lines = import_parts(files, folder, unit)
+        typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
+        source = ", ".join(file.name for file in files)
+        write_new_scenario(poses, [], source, out, (up, fixed, order, clearance_mm, max_overlap_mm))

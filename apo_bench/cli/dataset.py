@@ -19,6 +19,7 @@ from apo_bench.cli.shared import (
     name_write_errors,
 )
 from apo_bench.errors import require
+from apo_bench.io import format_count
 from apo_bench.records import FIRST_TRAINING_TRIAL
 
 _HELP = """
@@ -78,4 +79,4 @@ def dataset_make(
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     with name_write_errors():
         made, right = make_dataset(trials, out, command, format, led_by, partial(typer.echo, err=True))
-    typer.echo(f"{made} trials, {right} of them successful; {out / 'README.md'} describes them")
+    typer.echo(f"{format_count(made, 'trial')}, {right} successful; {out / 'README.md'} describes them")

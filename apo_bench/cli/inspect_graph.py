@@ -18,7 +18,9 @@ from apo_bench.cli.shared import (
 
 def graph_command(
     scenario: ScenarioArgument,
-    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
+    operation: Annotated[
+        int | None, typer.Option(help="Show the state after this operation; default: the last.")
+    ] = None,
     observation: Annotated[Path | None, make_path_option("Show the residuals of this observation.")] = None,
     out: Annotated[Path | None, make_path_option("Draw it into this file: .svg, .png, or .mmd (Mermaid text).")] = None,
     as_json: AsJson = False,
@@ -27,7 +29,7 @@ def graph_command(
 
     Examples:
       apo-bench inspect graph pocket_table --out graph.svg
-      apo-bench inspect graph stick_in_tower --step 2 --observation docs/seen.csv
+      apo-bench inspect graph stick_in_tower --operation 2 --observation docs/seen.csv
     """
     from apo_bench import load_scenario, read_observation
     from apo_bench.assembly import build_relation_graph, compute_observed_residuals
@@ -37,7 +39,7 @@ def graph_command(
 
     check_output(out, "--out", ".svg", ".png", ".mmd")
     task = load_scenario(scenario)
-    graph = build_relation_graph(task.assembly, step)
+    graph = build_relation_graph(task.assembly, operation)
     observed = None if observation is None else read_observation(observation, task)
     residuals = [None] * len(graph.arcs) if observed is None else compute_observed_residuals(observed, graph)
     gap_m = task.gap_mm * 1e-3 if observed is None else observed.gap_m

@@ -26,7 +26,9 @@ def poses_command(
     *,
     out: Annotated[Path, make_path_option("Draw the poses into this file: .png.")] = Path("poses.png"),
     observed: Annotated[bool, typer.Option("--observed", help="Draw the observed poses alone.")] = False,
-    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
+    operation: Annotated[
+        int | None, typer.Option(help="Show the state after this operation; default: the last.")
+    ] = None,
     method: Annotated[str, typer.Option(help="Corrector by name, or package.module:name.")] = CORRECTOR,
     observation: Annotated[Path | None, make_path_option("Use this observation in place of a trial.")] = None,
     deviation_mm: DeviationMm = None,
@@ -37,7 +39,7 @@ def poses_command(
 
     Examples:
       apo-bench inspect poses stick_in_tower --noise-level 2 --seed 7 --out poses.png
-      apo-bench inspect poses stick_in_tower --observation docs/seen.csv --step 2 --observed
+      apo-bench inspect poses stick_in_tower --observation docs/seen.csv --operation 2 --observed
     """
     from apo_bench import correct, fit_plan, load_scenario
     from apo_bench.formats.deviations import assumed_deviations
@@ -48,8 +50,8 @@ def poses_command(
     check_output(out, "--out", ".png")
     task = load_scenario(scenario)
     last = len(task.assembly)
-    step = last if step is None else step
-    require(1 <= step <= last, f"--step must be from 1 to {last}, got {step}.")
+    step = last if operation is None else operation
+    require(1 <= step <= last, f"--operation must be from 1 to {last}, got {step}.")
     seen, assumed = load_or_draw_observation(scenario, observation, options, deviation_mm, deviation_deg)
     _check_observed(seen, step)
     panels = [poses_panel("observed", seen, seen.poses, step)]
@@ -72,5 +74,5 @@ def _check_observed(seen: Observation, step: int) -> None:
     missed = int(seen.observed.argmin()) + 1
     if seen.observed.all() or missed > step:
         return
-    advice = f"; --observed --step {missed - 1} draws the state before it" * (missed > 1)
+    advice = f"; --observed --operation {missed - 1} draws the state before it" * (missed > 1)
     raise RuntimeError(f"operation {missed} was not observed, so the poses after it are unknown{advice}.")

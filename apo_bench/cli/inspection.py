@@ -11,7 +11,7 @@ from apo_bench.cli.inspect_scene import scene_command
 from apo_bench.cli.shared import Command, make_group
 
 _HELP = """
-Look into one assembly: free directions, motions, relations, scene, poses, depth images.
+Inspect one assembly: free directions, motions, relations, scene, poses, depth images.
 
 Examples:
   apo-bench inspect dof stick_in_tower

@@ -41,7 +41,13 @@ def part_import(
     name: Annotated[list[str] | None, typer.Option(help="Rename a face, such as hole1=bore; may be repeated.")] = None,
     density: Annotated[float, typer.Option(min=1.0, max=25_000.0, help="Density in kg/m^3.")] = 1000.0,
     round_sides: Annotated[
-        int, typer.Option("--round", min=5, max=64, help="Of a mesh: fewest flat sides of a full turn that are round.")
+        int,
+        typer.Option(
+            "--min-round-sides",
+            min=5,
+            max=64,
+            help="Of a mesh: smallest number of flat sides around an axis that make a round face.",
+        ),
     ] = 12,
     as_json: AsJson = False,
 ) -> None:
@@ -85,14 +91,16 @@ def part_export(
         typer.Option(min=0.0, max=5.0, help="Clearance of your printer, per side, in mm; default: as the scenario."),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, max=1000, help="Trials in the form.")] = 20,
-    method: Annotated[list[str] | None, typer.Option(help="Method in the form; may be repeated.")] = None,
-    step: Annotated[bool, typer.Option("--step", help="Write STEP files, too.")] = False,
+    method: Annotated[list[str] | None, typer.Option(help="Method to name in the form; may be repeated.")] = None,
+    step_files: Annotated[
+        bool, typer.Option("--step-files", help="Write STEP files as well; needs the extra cad.")
+    ] = False,
 ) -> None:
     """Write a kit for a real robot: parts and a plate to print (STL), places of tags, and a form for the results.
 
     Examples:
       apo-bench part export stick_in_tower --clearance-mm 0.3 --out kit
-      apo-bench part export pocket_table --step --trials 30 --method uncorrected --method contact --out kit
+      apo-bench part export pocket_table --step-files --trials 30 --method uncorrected --method contact --out kit
     """
     from apo_bench.formats.kit import write_kit
     from apo_bench.scenario import load_scenario
@@ -100,7 +108,7 @@ def part_export(
     task = load_scenario(scenario)
     clearance = task.clearance_mm if clearance_mm is None else clearance_mm
     with name_write_errors(f"--out {out}"):
-        files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], trials, step)
+        files = write_kit(task, clearance, out, method or ["uncorrected", "contact"], trials, step_files)
     for file, count in files.items():
         typer.echo(f"{file}: print {count}")
     typer.echo(f"{out / 'tags.csv'}: where tags lie on the plate; {out / 'form.csv'}: fill in, one line a trial")

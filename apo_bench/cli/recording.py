@@ -36,10 +36,10 @@ def recording_import(
     objects: Annotated[Path, make_path_option("Part and frame of each id: .toml.")],
     out: Annotated[Path, make_path_option("Write the observation: .json, or .csv without starts and covariances.")],
     scenario: Annotated[str | None, typer.Option(help="Scenario of the recording; .json needs one.")] = None,
-    ends: Annotated[
+    operation_ends: Annotated[
         str | None, typer.Option(help="End of each operation in s, with commas, where the log is ambiguous.")
     ] = None,
-    unseen: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
+    unobserved: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
     picture: Annotated[Path | None, make_path_option("Draw frames, paths and rests: .png.")] = None,
     paths: Annotated[Path | None, make_path_option("Write the paths between rests: .csv.")] = None,
 ) -> None:
@@ -58,8 +58,11 @@ def recording_import(
     check_output(out, "--out", ".json", ".csv", inputs=inputs)
     check_output(picture, "--picture", ".png", inputs=inputs)
     check_output(paths, "--paths", ".csv", inputs=inputs)
-    planned = out.suffix.lower() == ".json" or ends or unseen or paths
-    require(scenario is not None or not planned, "--out .json, --ends, --unseen and --paths need --scenario; add it.")
+    planned = out.suffix.lower() == ".json" or operation_ends or unobserved or paths
+    require(
+        scenario is not None or not planned,
+        "--out .json, --operation-ends, --unobserved and --paths need --scenario; add it.",
+    )
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
@@ -68,7 +71,7 @@ def recording_import(
     if scenario is None:
         _import_alone(read, stated, tracks, out, picture)
     else:
-        order = _parse_order(ends, unseen)
+        order = _parse_order(operation_ends, unobserved)
         _import_for_scenario(read, named.models, stated, tracks, scenario, order, out, picture, paths)
     print_written(out, paths, picture)
 
@@ -86,7 +89,7 @@ def _import_for_scenario(
     task = load_scenario(scenario)
     require(
         all(0 <= k < len(task.assembly) for k in order.unseen),
-        f"--unseen must hold operations from 1 to {len(task.assembly)}.",
+        f"--unobserved must hold operations from 1 to {len(task.assembly)}.",
     )
     try:
         imported = import_recording(tracks, camera, task, order, log.file, models)
@@ -125,9 +128,9 @@ def _import_alone(log: Any, camera: Any, tracks: Any, out: Path, picture: Path |
 def _parse_order(ends: str | None, unseen: str | None) -> Any:
     from apo_bench.importers.recording.ordering import Stated
 
-    require(not ends or not unseen, "--ends and --unseen exclude each other; leave one of them out.")
-    hidden = parse_list(unseen, "--unseen", int) if unseen else ()
-    return Stated(parse_list(ends, "--ends", float) if ends else (), tuple(k - 1 for k in hidden))
+    require(not ends or not unseen, "--operation-ends and --unobserved exclude each other; leave one of them out.")
+    hidden = parse_list(unseen, "--unobserved", int) if unseen else ()
+    return Stated(parse_list(ends, "--operation-ends", float) if ends else (), tuple(k - 1 for k in hidden))
 
 
 def _show_rests(title: str, camera: Any, parts: list[str], rests: list[Any], tracks: Any, picture: Path | None) -> None:

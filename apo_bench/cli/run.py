@@ -34,7 +34,7 @@ def run_command(
     video: Annotated[Path | None, make_path_option("Write a film of the replay: .mp4 or .gif.")] = None,
     trial_limit: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="End a trial that add_options longer; it runs in another process."),
+        typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in another process."),
     ] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print every number of the record.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Step through the trial after its end, as `view` does.")] = False,

@@ -16,7 +16,6 @@ from apo_bench.cli.shared import (
     make_path_option,
     print_columns,
 )
-from apo_bench.errors import require
 from apo_bench.records import SETTINGS, check
 
 _HELP = """
@@ -115,11 +114,9 @@ def write_new_scenario(
     """
     from apo_bench import load_scenario
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
-    from apo_bench.importers.assembly.posed import UPS
     from apo_bench.importers.assembly.writing import choice_lines
 
     up, fixed, order, clearance_mm, max_overlap_mm = choices
-    require(up is None or up in UPS, f"--up must be one of {', '.join(UPS)}, got {up}.")
     names = [name.strip() for name in order.split(",")] if order else []
     made = scenario_from_poses(
         poses,

@@ -90,7 +90,12 @@ def score_command(
     out.parent.mkdir(parents=True, exist_ok=True)
     check_output(out, "--out", ".json")
     if out.exists():
-        read_entry(out)  # only an entry may be replaced
+        lost = set(read_entry(out).tracks) - {each.name for each in tracks}
+        require(
+            not lost,
+            f"'{out}' has scores of other tracks, which this command would delete: {', '.join(sorted(lost))}; add them "
+            "with --track, or give another file with --out.",
+        )
     name = name or command
     check_name("entry", name or method or "")
     records = out.with_suffix("")

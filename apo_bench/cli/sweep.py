@@ -52,7 +52,7 @@ def sweep_command(
     ] = None,
     workers: Workers = None,
     trial_limit: Annotated[
-        float, typer.Option(metavar="SECONDS", help="A trial that add_options longer has failed.")
+        float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
     backend: Backend = "local",
     address: Address = None,

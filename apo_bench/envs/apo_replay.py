@@ -202,13 +202,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._current("nothing was observed").observation
 
     @property
-    def reobserve(self) -> Reobservations | None:
-        """Observes operations of this episode again, `max_reobservations` times; None if that is 0.
+    def reobserve(self) -> Reobservations:
+        """Observes operations of this episode again, `max_reobservations` times.
 
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        return self._current("nothing was observed").reobserve if self._allowed else None
+        return self._current("nothing was observed").reobserve
 
     @property
     def trial(self) -> int:
@@ -244,7 +244,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         measured = source == DEPTH_CAMERA
         noise = range_sensor(self._scene, simulated, self._now.noise_level.mm) if measured else self._noise
         observation = observe_demonstration(simulated, noise, trial)
-        reobserve = reobservations_of(simulated, noise, trial, self._allowed) if self._allowed else None
+        reobserve = reobservations_of(simulated, noise, trial, self._allowed)
         self._episode = Episode(trial, replace(simulated, images=None), observation, reobserve)
         self.aim(observation.poses)
         self._refused = observation_failure(observation)

@@ -61,7 +61,8 @@ class CorrectPoses(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.util
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Observe another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
-        correction = self._correct(self._base.observation, self._corrector, self._base.reobserve)
+        reobserve = self._base.reobserve
+        correction = self._correct(self._base.observation, self._corrector, reobserve if reobserve.left else None)
         poses = correction.poses
         if correction.ok:
             plan = self._base.planned(correction)

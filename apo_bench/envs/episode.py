@@ -50,7 +50,7 @@ class Episode:
     simulated: SimulatedDemonstration
     """Without its images."""
     observation: Observation
-    reobserve: Reobservations | None
+    reobserve: Reobservations
     """None where no reobservation is allowed."""
 
 

@@ -22,9 +22,15 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
 
     Raises:
         InputError: The file cannot be read, or a solid makes no part.
+
+    Examples:
+        >>> import apo_bench, tempfile, trimesh
+        >>> folder = tempfile.mkdtemp()
+        >>> mesh = trimesh.creation.box((60, 40, 20)).export(f"{folder}/plate.stl")
+        >>> [file.name for file in apo_bench.import_part(f"{folder}/plate.stl", folder, unit="mm")]
+        ['plate.xml']
     """
-    from apo_bench.importers.cad.importing import import_solid as write_part
-    from apo_bench.importers.cad.importing import raw_solids
+    from apo_bench.importers.cad.importing import import_solid, raw_solids
     from apo_bench.importers.cad.solids.naming import make_part_name
 
     source, target = Path(file), Path(folder)
@@ -32,7 +38,7 @@ def import_part(file: str | Path, folder: str | Path, *, unit: str | None = None
     written: dict[str, Path] = {}
     for raw in raw_solids(source, unit)[1]:
         name = make_part_name(raw.name, set(written))
-        written[name] = write_part(raw, name, target, source.name).path
+        written[name] = import_solid(raw, name, target, source.name).path
     return tuple(written.values())
 
 
@@ -67,8 +73,18 @@ def import_assembly(
     Raises:
         InputError: A file cannot be read, a solid makes no part, or the scenario file exists.
         RuntimeError: There is no order in which the parts can be assembled.
+
+    Examples:
+        >>> import apo_bench, tempfile, trimesh
+        >>> folder = tempfile.mkdtemp()
+        >>> plate, block = trimesh.creation.box((60, 50, 20)), trimesh.creation.box((30, 30, 40))
+        >>> files = [f"{folder}/plate.stl", f"{folder}/block.stl"]
+        >>> meshes = plate.export(files[0]), block.apply_translation((0, 0, 30)).export(files[1])
+        >>> scenario = apo_bench.import_assembly(files, f"{folder}/clamp.toml", unit="mm")
+        >>> [operation.main for operation in scenario.assembly.operations]
+        ['block']
     """
-    from apo_bench.importers.assembly.from_cad import import_parts as write_parts
+    from apo_bench.importers.assembly.from_cad import import_parts, remove_on_failure
     from apo_bench.importers.assembly.from_poses import scenario_from_poses
 
     sources = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
@@ -76,18 +92,19 @@ def import_assembly(
     target = Path(f"{sources[0].stem}.toml") if out is None else Path(out)
     require(target.suffix == ".toml", f"'{target}' was given; use a file name that ends in .toml.")
     require(not target.exists(), f"'{target}' exists already; give another file as `out`.")
-    poses, _ = write_parts(sources, target.with_name(f"{target.stem}_parts"), unit)
-    scenario_from_poses(
-        poses,
-        (),
-        target,
-        ", ".join(source.name for source in sources),
-        up=up,
-        fixed=fixed,
-        order=order,
-        clearance_mm=clearance_mm,
-        max_overlap_mm=max_overlap_mm,
-    )
+    with remove_on_failure(target.with_name(f"{target.stem}_parts")) as folder:
+        poses, _ = import_parts(sources, folder, unit)
+        scenario_from_poses(
+            poses,
+            (),
+            target,
+            ", ".join(source.name for source in sources),
+            up=up,
+            fixed=fixed,
+            order=order,
+            clearance_mm=clearance_mm,
+            max_overlap_mm=max_overlap_mm,
+        )
     return load_scenario(target)
 
 

@@ -24,7 +24,7 @@ from apo_bench.io.result_files import check_target, open_to_append, replace_file
 from apo_bench.io.safe_io import decode_text, open_file, read_bytes, read_lines, read_text
 from apo_bench.io.safe_text import CONTROL, UNSHOWN, clean, escape_markdown, shorten_text
 from apo_bench.io.streams import redirect_output
-from apo_bench.io.text import add_the, align_columns, format_direction, join_words
+from apo_bench.io.text import add_the, align_columns, format_count, format_direction, join_words
 from apo_bench.io.toml_text import format_toml
 
 __all__ = (
@@ -49,6 +49,7 @@ __all__ = (
     "convert_typed",
     "decode_text",
     "escape_markdown",
+    "format_count",
     "format_direction",
     "format_toml",
     "group_by",

@@ -12,6 +12,11 @@ def add_the(part: str) -> str:
     return part if part[-1].isdigit() or part[0].isupper() else f"the {part}"
 
 
+def format_count(n: int, noun: str) -> str:
+    """`1 trial`, `2,000 trials`."""
+    return f"{n:,} {noun}{'' if n == 1 else 's'}"
+
+
 def join_words(words: Iterable[str]) -> str:
     """`x`, `x and y`, `x, y and yaw`; empty if there are none."""
     *most, last = [*words] or [""]

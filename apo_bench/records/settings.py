@@ -178,8 +178,9 @@ class TrialConfig:
     method: Name = field(
         default=CORRECTOR,
         metadata=about(
-            "oracle, uncorrected, nominal, spiral-search, a corrector or package.module:name; any of them with "
-            "+spiral or +probe",
+            "contact-robust or another corrector (`apo-bench method list`), package.module:name, uncorrected (observed "
+            "poses), nominal (poses of the scenario file), oracle (true poses), spiral-search; +spiral and +probe add "
+            "a spiral search and probing",
             spelled=checked_method,
             key=True,
             axis=True,
@@ -242,7 +243,7 @@ class TrialConfig:
     timestep_s: TimestepS = field(
         default=0.001,
         metadata=about(
-            "Time step of the physics in ms: 1 for tables, 0.5 to check",
+            "Time step of the physics, in ms; smaller is slower and more exact",
             option="timestep-ms",
             scale=1e-3,
             shared=True,

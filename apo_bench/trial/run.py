@@ -90,6 +90,7 @@ def run_trial(
     scene: Scene | None = None,
     *,
     method: str | Callable[..., Any] | None = None,
+    noise: str | Callable[..., Any] | None = None,
     simulated: SimulatedDemonstration | None = None,
     content: str | None = None,
     watch: Callbacks | None = None,
@@ -103,6 +104,7 @@ def run_trial(
         scene: The scene of scenario, clearance, grasp, arm and time step of the configuration. Default: compiled here.
         method: A method by name, or a corrector: a callable `Observation -> Correction`, or `Observation -> (n, 4, 4)`
             poses in the world frame, [m]. Default: that of the configuration.
+        noise: A noise model by name or file, or the object itself as in `observe`. Default: that of the configuration.
         simulated: The demonstration of this seed and human error scale. Default: simulated here.
         content: From `content_hash`. Default: computed here.
         watch: Called with the `mujoco.MjData` about every 20 ms of simulated time, such as a `Film`.
@@ -125,6 +127,8 @@ def run_trial(
         scene = scene or scene_of(config, loaded)
     if method is not None:
         config = replace(config, method=method if isinstance(method, str) else function_name(method))
+    if noise is not None:
+        config = replace(config, noise=noise if isinstance(noise, str) else function_name(noise))
     scene = scene or scene_of(config)
     require(
         config.scenario == scene.scenario.name or config.scenario not in list_scenario_names(),
@@ -138,11 +142,11 @@ def run_trial(
     if simulated.demonstration.code != "ok":
         return record | end_record(demonstration_failure(simulated.demonstration), success=None)
     truth = simulated.layout.poses
-    noise = noise_of(config, scene, simulated)
-    observation = observe_demonstration(simulated, noise, config.seed, config.secret_seed)
+    model = noise_of(config, scene, simulated, noise)
+    observation = observe_demonstration(simulated, model, config.seed, config.secret_seed)
     given = _choose_contacts(config, observation, truth)
     reobserve = reobservations_of(
-        simulated, noise, config.seed, config.max_reobservations, config.secret_seed, given.assembly
+        simulated, model, config.seed, config.max_reobservations, config.secret_seed, given.assembly
     )
     corrector = method if callable(method) else parse_method(config.method).corrector
     context = RunContext(scene, config, corrector, watch, cache)
@@ -244,11 +248,15 @@ def _choose_contacts(config: TrialConfig, observation: Observation, truth: Array
     return replace_contacts(observation, make_contacts(config.contact_source), truth, rng)
 
 
-def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
-    """The noise model of a trial, or the depth camera that recorded its demonstration."""
+def noise_of(settings: TrialConfig, scene: Scene, simulated: SimulatedDemonstration, noise: Any = None) -> Noise:
+    """The noise model of a trial, or the depth camera that recorded its demonstration.
+
+    Args:
+        noise: The model in place of its name in the settings.
+    """
     if settings.pose_source == DEPTH_CAMERA:
         return range_sensor(scene, simulated, settings.noise_mm)
-    return make_noise(settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
+    return make_noise(noise or settings.noise, NoiseLevel(settings.noise_mm, settings.noise_deg))
 
 
 def probing_config(

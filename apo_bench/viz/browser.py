@@ -17,11 +17,13 @@ from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
 from apo_bench.simulation.film.window import PICTURE_S
 from apo_bench.simulation.scene import make_initial_state
 from apo_bench.trial.rollout import Rollout
-from apo_bench.viz.stepping import Cursor
+from apo_bench.viz.stepping import start_at_end
 
 HOST = "127.0.0.1"
 PORT = 8080
 _FOV_RAD = np.radians(45.0)  # as in films
+_BESIDE_PANEL = 0.12  # so far right of the assembly the camera looks, over its distance: the panel hides the right side
+_NEARER = 0.8  # over the distance in films, which show the gripper above the assembly
 _BUTTONS = (
     {"play / stop": "play", "moment back": "previous", "moment on": "next"},
     {"operation back": "previous operation", "operation on": "next operation"},
@@ -67,7 +69,7 @@ class Page:
     """The page that one or several browsers show; they share one place in the rollout."""
 
     def __init__(self, rollout: Rollout, port: int) -> None:
-        self.cursor = Cursor(rollout)
+        self.cursor = start_at_end(rollout)
         self._requests = deque[str | int]()
         self._data = make_initial_state(rollout.scene.work, rollout.segments[0].start)
         self._server = _server(port)
@@ -132,11 +134,12 @@ class Page:
         self._server.scene.configure_default_lights(cast_shadow=False)
         at, far = frame_parts(rollout.scene.scenario.assembly, [rollout.assembled])
         azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
-        # where the camera looks, as a unit vector
-        ahead = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        # unit vectors: where the camera looks, and to its right
+        ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
         view = self._server.initial_camera
-        view.look_at = at
-        view.position = at - far * np.array(ahead)
+        view.look_at = at + _BESIDE_PANEL * far * right
+        view.position = view.look_at - _NEARER * far * ahead
         view.fov = _FOV_RAD
 
     def _add_controls(self) -> None:

@@ -47,7 +47,7 @@ def find_facts(model: Any) -> Facts:
     return own if isinstance(own, Facts) else Facts(" ".join(title.split()), (), "", (), "")
 
 
-def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> ErrorSample:
+def draw_errors(model: Any, noise_level: NoiseLevel) -> ErrorSample:
     """Errors of many observations of the nominal example 5.1; operations that were not observed have none."""
     noise = make_noise(model, noise_level)
     demonstration = nominal_demonstration()
@@ -55,7 +55,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Err
     rng = np.random.default_rng(0)
     errors = []
     variances = []
-    for _ in range(draws):
+    for _ in range(_DRAWS):
         observation = observe(demonstration, noise, rng)
         # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
         Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.poses), 1, 2) @ observation.poses[:, :3, :3])
@@ -67,7 +67,7 @@ def draw_errors(model: Any, noise_level: NoiseLevel, draws: int = _DRAWS) -> Err
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
     stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
-    missed = 1.0 - len(four) / (draws * len(demonstration.poses))
+    missed = 1.0 - len(four) / (_DRAWS * len(demonstration.poses))
     return ErrorSample(four, np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale, missed)
 
 
@@ -79,9 +79,9 @@ def nominal_demonstration() -> Demonstration:
     return Demonstration(scenario.assembly, scenario.start, poses, final, np.zeros((len(poses), 6, 6)))
 
 
-def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample, heading: int = 1) -> str:
+def noise_sheet(model: Any, noise_level: NoiseLevel, sample: ErrorSample) -> str:
     """The sheet of a model in Markdown, with a table of errors that it made."""
-    facts = describe_model(model, heading)
+    facts = describe_model(model)
     if not len(sample.errors):
         return f"{facts}\nNo operation of {SCENARIO} was observed.\n"
     missed = f"; {100 * sample.missed:.1f} % were not observed" if sample.missed else ""

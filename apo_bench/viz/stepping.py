@@ -144,3 +144,10 @@ class Cursor:
             poses = compute_placements(begun, self.segment.start, goals[: k + 1])[-1]
             overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)
+
+
+def start_at_end(rollout: Rollout) -> Cursor:
+    """Return a cursor at the last moment, where the assembly and the outcome are seen, without names of faces."""
+    cursor = Cursor(rollout, faces="none")
+    cursor.go(len(cursor.places))
+    return cursor

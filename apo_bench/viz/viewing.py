@@ -7,7 +7,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.simulation.film.window import no_window, step_in_window
 from apo_bench.trial.rollout import Rollout
 from apo_bench.viz.browser import PORT, no_browser, serve_rollout
-from apo_bench.viz.stepping import Cursor
+from apo_bench.viz.stepping import start_at_end
 
 Display = Literal["window", "browser"]
 
@@ -40,7 +40,7 @@ def view(rollout: Rollout, display: Display, port: int | None, say: Callable[[st
         if display == "browser":
             serve_rollout(rollout, PORT if port is None else port, say)
         else:
-            cursor = Cursor(rollout)
+            cursor = start_at_end(rollout)
             step_in_window(rollout.scene, rollout.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
     except KeyboardInterrupt:
         say("")

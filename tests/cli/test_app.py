@@ -64,7 +64,7 @@ def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) 
         "R8 cube2 -> table made 6 [nz-A_fl px-A_px nx-A_nx py-A_py ny-A_ny]",
     ):
         assert line in lines
-    _, out, _ = run(capsys, "inspect", "graph", "pocket_table", "--step", "3")
+    _, out, _ = run(capsys, "inspect", "graph", "pocket_table", "--operation", "3")
     assert "lost" not in out
     assert "R5" not in out
 

@@ -16,7 +16,7 @@ TRIED += ("scipy", "sitecustomize", "sksparse", "viser", "yaml")
 """Packages that dependencies try to import, installed or not."""
 SHORT = (
     *("--trials", "1", "--noise-level", "1", "--human-error-scale", "0", "--fidelity", "near-contact"),
-    *("--method", "uncorrected,mine:correct", "--workers", "2"),
+    *("--method", "uncorrected,mine:correct", "--workers", "1"),
 )
 COMMANDS = """
 inspect graph block_on_block --out graph.png
@@ -62,7 +62,7 @@ def started(hostile: Path, *command: str) -> tuple[subprocess.CompletedProcess[s
 
 @pytest.fixture(scope="module")
 def run(hostile: Path) -> Path:
-    """A sweep of two processes with a method of that folder."""
+    """A sweep of another process with a method of that folder."""
     done, owned = started(hostile, str(PROGRAM), "sweep", "block_on_block", *SHORT, "--out", "run")
     assert (done.returncode, owned) == (0, "")
     return hostile / "run"

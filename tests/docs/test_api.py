@@ -55,6 +55,15 @@ def test_every_argument_of_a_public_function_is_documented(name: str) -> None:
     assert [argument for argument in inspect.signature(function).parameters if argument not in documented] == []
 
 
+def test_every_public_function_has_an_example_in_its_docstring_or_on_its_page() -> None:
+    blocks = (re.findall(r"^```python\n(.*?)^```$", page.read_text(), re.M | re.S) for page in PAGES.glob("*.md"))
+    shown = "\n".join(text for of_page in blocks for text in of_page)
+    functions = [name for name in apo_bench.__all__ if inspect.isfunction(getattr(apo_bench, name))]
+    without = [name for name in functions if ">>>" not in (inspect.getdoc(getattr(apo_bench, name)) or "")]
+    assert len(functions) > 20
+    assert [name for name in without if f"apo_bench.{name}(" not in shown] == []
+
+
 def examples() -> list[doctest.DocTest]:
     finder = doctest.DocTestFinder(recurse=False)
     public = ((name, getattr(apo_bench, name)) for name in apo_bench.__all__)

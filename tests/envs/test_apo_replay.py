@@ -309,12 +309,19 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     [
         ({"noise_level": "1"}, "level of APOReplay must be a number or a list"),
         ({"noise": "isotropc"}, "did you mean 'isotropic'"),
+        ({"noise_levl": 1}, "unknown argument of APOReplay 'noise_levl'; did you mean 'noise_level'"),
         ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         APOReplay(**arguments)
+
+
+def test_an_environment_without_reobservations_names_the_setting(small: APOReplay) -> None:
+    small.reset(seed=0)
+    with pytest.raises(InputError, match="give a larger max_reobservations"):
+        small.reobserve([0])
 
 
 def test_a_picture_without_a_display(small: APOReplay) -> None:

@@ -40,6 +40,19 @@ def test_an_assembly_becomes_a_scenario_that_runs(drawn: Path, tmp_path: Path, m
         apo_bench.save_scenario(scenario, tmp_path / "copy")
 
 
+def test_an_import_that_fails_leaves_no_parts(drawn: Path, tmp_path: Path) -> None:
+    for wrong in ({"order": ["nothing"]}, {"fixed": ["nothing"]}, {"up": "w"}):
+        with pytest.raises(apo_bench.InputError):
+            apo_bench.import_assembly(drawn, tmp_path / "blocks.toml", unit="mm", **wrong)
+    assert list(tmp_path.iterdir()) == []
+    kept = tmp_path / "blocks_parts" / "mine.txt"
+    kept.parent.mkdir()
+    kept.touch()
+    with pytest.raises(apo_bench.InputError):
+        apo_bench.import_assembly(drawn, tmp_path / "blocks.toml", unit="mm", fixed=["nothing"])
+    assert kept.exists()
+
+
 def test_a_scenario_is_shown_assembled_and_at_its_start() -> None:
     finished, start = (apo_bench.show_scenario("block_on_block", finished=end) for end in (True, False))
     assert finished.shape == start.shape == (480, 640, 3)

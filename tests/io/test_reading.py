@@ -105,13 +105,8 @@ def test_a_document_becomes_its_type(tmp_path: Path) -> None:
     [
         ([], "plan: a table of named keys is needed, [] was given."),
         (GOOD | {"rat": 1}, "plan: unknown key 'rat' (did you mean 'rate'?)."),
-        (GOOD | {"\n": 1}, "plan: unknown key '\\n'."),
         (GOOD | {"rate": -1}, "plan, rate: a number >= 0.0 is needed, -1 was given."),
         (GOOD | {"rate": "fast"}, 'plan, rate: a number is needed, "fast" was given.'),
-        (
-            GOOD | {"operations": [{"type": "go"}]},
-            'plan, operation 1, type: "step" or "wait" is needed, "go" was given.',
-        ),
         (
             GOOD | {"operations": [STEP | {"move": "\x1b[2J"}]},
             "plan, operation 1, move: a text without control characters",

@@ -43,12 +43,9 @@ def test_the_sentence_names_file_line_and_field(name: str, text: str, said: str,
     folder.mkdir()
     for file in FILES:
         (folder / file).write_bytes((KEPT / file).read_bytes())
-    if name == "run.json":
-        (folder / name).write_text(text, encoding="utf-8")
-    else:
-        lines = (folder / name).read_text(encoding="utf-8").splitlines()
-        lines[0] = json.dumps(json.loads(lines[0]) | json.loads(text)).replace("Infinity", "1e999")
-        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lines = (folder / name).read_text(encoding="utf-8").splitlines()
+    lines[0] = json.dumps(json.loads(lines[0]) | json.loads(text)).replace("Infinity", "1e999")
+    (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(InputError) as refused:
         read(folder)
     assert str(refused.value).startswith(str(folder / name))

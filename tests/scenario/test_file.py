@@ -21,7 +21,6 @@ BRIDGE, FIXTURE, POCKETS, BLOCKS = (
 )
 STICK_START = "start = { at_mm = [60, 290, 10] }"
 GOAL3 = "goal = { at_mm = [0, 0, 40] }"
-BOTTOM = 'contacts = [["bottom", "table.top"]]'
 ON_TOP = 'contacts = [["topP", "castle1.topN"], ["topN", "castle1.topP"]]'
 VARY2 = 'vary = { along = "x", mm = [-4, 4] }'
 STICK_CONTACTS = TOWER[TOWER.index("contacts = [\n") : TOWER.index("]\nattach") + 1]
@@ -34,13 +33,7 @@ BROKEN = {
     "an unknown part file": ('file = "stick"', 'file = "stik"', ["parts, stick", "did you mean 'stick'"]),
     "a fixed part that moves": ('move = "castle1"', 'move = "table"', ["operation 1, move", "'table' is fixed"]),
     "an idle part": ("\n[site]", '\n[parts.cube]\nfile = "cube"\nstart = { at_mm = [0, 300, 25] }\n[site]', ["'cube'"]),
-    "a face of its own": (
-        '["bottom", "table.top"]',
-        '["bottom", "castle1.topP"]',
-        ["'castle1' moves in this operation"],
-    ),
     "faces look away": (ON_TOP, 'contacts = [["bottom", "castle1.topN"]]', ["contact 1", "0 degrees apart", "180"]),
-    "faces beside": (ON_TOP, 'contacts = [["topP", "castle1.topP"]]', ["contact 1", "do not overlap"]),
     "parts overlap": (
         GOAL3 + "\n" + STICK_CONTACTS,
         'goal = { at_mm = [0, 0, 38] }\ncontacts = [["py", "castle1.spy"]]',
@@ -49,17 +42,7 @@ BROKEN = {
     "in the way of a site": ("spread_mm = [40, 60]", "spread_mm = [30, 240]", ["site", "when the site is at"]),
     "turned over": (", 40], turn_deg = [180, 0, 0] }\n", ", 0] }\n", ["operation 2, goal", "tilted by 180 degrees"]),
     "vary along what is fixed": (VARY2, VARY2.replace('"x"', '"z"'), ["operation 2, vary", "varied by -4 mm"]),
-    "no axis": (
-        'attach = { along = "+x"',
-        'attach = { along = "xy"',
-        ["operation 3, attach, along", "an axis is needed"],
-    ),
     "a grasp outside": ("[-65, 0, 4]", "[-650, 0, 4]", ["operation 3, grasp, at_mm", "a point of the part"]),
-    "carries too early": (
-        BOTTOM,
-        BOTTOM + '\ncarries = ["stick"]',
-        ["operation 1, carries", "'stick'", "move it first"],
-    ),
     "starts in the air": (STICK_START, STICK_START.replace("10]", "22.5]"), ["stick, start", "12.5 mm above 'table'"]),
 }
 

@@ -102,10 +102,6 @@ def with_part(of: Scene, part: Any) -> Scene:
             with_part(rounds.peg_in_plate(), rounds.plate(fit=False)),
             "the shaft has no play in the hole, 0 mm per side by their sizes, and neither is fit",
         ),
-        (
-            with_part(rounds.peg_in_plate(), rounds.peg(radius=5.3)),
-            "the shaft has no play in the hole, -0.3 mm per side by their sizes and 0.25 mm of clearance",
-        ),
     ],
 )
 def test_what_is_not_closed_is_named(of: Scene, words: str) -> None:

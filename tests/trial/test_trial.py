@@ -132,6 +132,16 @@ def test_wrong_relations_are_told_and_noted(
     assert apart == {"contact_source", "config_hash"}
 
 
+def test_a_noise_model_may_be_the_object_itself(scene: Scene, shown: SimulatedDemonstration) -> None:
+    by_name = run_trial(SPEC, scene, simulated=shown, noise="isotropic")
+    mine = make_noise("isotropic", NoiseLevel(SPEC.noise_mm, SPEC.noise_deg))
+    own = run_trial(SPEC, scene, simulated=shown, noise=mine)
+    assert {key for key in own if own[key] != by_name[key]} == {"noise", "config_hash"}
+    assert own["noise"] == "session:IsotropicNoise"
+    with pytest.raises(InputError, match="noise of run_trial must be a text, a function or None"):
+        run_trial(SPEC, scene, noise=3)  # type: ignore[arg-type]
+
+
 def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
     content = content_hash(scene.scenario, "stick_in_tower", scene.arm.files)
     same = {config_hash(replace(SPEC, method=m, seed=k), content) for m in ("uncorrected", "paper") for k in (0, 9)}

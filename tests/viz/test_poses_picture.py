@@ -54,7 +54,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("--step", "4"), "--step must be from 1 to 3, got 4"),
+        (("--operation", "4"), "--operation must be from 1 to 3, got 4"),
         (
             ("--noise-level", "1", "--observation", "docs/seen.csv"),
             "--noise-level, which draws a trial, was given together with",

@@ -201,6 +201,8 @@ def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.M
     def click(label: str) -> None:
         happen(next(on for group, on in zip(groups, clicked, strict=True) if label in group.args[1]), label)
 
+    assert cursor.place == len(cursor.places) - 1  # the outcome
+    cursor.go(0)
     for label, place in (("moment on", 1), ("moment on", 2), ("moment back", 1), ("operation on", 2)):
         click(label)
         page.draw()

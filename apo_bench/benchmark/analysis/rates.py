@@ -119,7 +119,7 @@ def compute_wilson_interval(successes: int, trials: int) -> Interval:
 
 
 def tally(records: Records) -> tuple[ConditionResult, ...]:
-    """Count trials into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
+    """Count trials by condition, sorted by scenario, clearance, noise, contacts, human error, grasp, method, level.
 
     Raises:
         InputError: A trial is there twice.

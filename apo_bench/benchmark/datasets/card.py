@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, final
 
 from apo_bench import __version__
 from apo_bench.geometry import Array
-from apo_bench.io import write_file
+from apo_bench.io import format_count, write_file
 
 FPS = 20
 """Frames, and actions, a second of simulated time."""
@@ -77,7 +77,8 @@ def write_card(
         counted: How many episodes there are, and how many of them are right.
         tables: Files, as a pattern -> column -> a `Field`, or in words what it is.
     """
-    summary = f"{counted[0]} simulated trials, {counted[1]} of them right, made by apo_bench {__version__} with MuJoCo"
+    trials = f"{format_count(counted[0], 'simulated trial')}, {counted[1]} right"
+    summary = f"{trials}, made by apo_bench {__version__} with MuJoCo"
     lerobot = "LeRobot, " if any(pattern.startswith("meta/") for pattern in tables) else ""
     lines = [
         *("---", "license: apache-2.0", "task_categories: [robotics]", f"tags: [{lerobot}assembly, simulation]"),

@@ -75,26 +75,24 @@ def by_part(noise: Noise) -> bool:
 
 
 def observe_many(
-    assembly: Assembly, shown: Layouts, human_error_scale: Array, noise: Noise, rng: np.random.Generator
+    assembly: Assembly, shown: Layouts, human_error: Array, noise: Noise, rng: np.random.Generator
 ) -> Seen:
     """What a noise model makes of many demonstrations of one assembly.
 
     Args:
         shown: Where every part was put.
-        careless: (k, 6, 6), as in a `Demonstration`.
+        human_error: (k, 6, 6), covariance as in a `Demonstration`.
     """
     n, k = shown.poses.shape[:2]
     if by_part(noise):
         start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
         long = Demonstration(
-            _repeated(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error_scale, (n, 1, 1))
+            _repeated(assembly, n), start, shown.poses.reshape(-1, 4, 4), {}, np.tile(human_error, (n, 1, 1))
         )
         return _stacked([noise(long.assembly, long, rng)], n, k)
     each = []
     for i, goals in enumerate(shown.poses):
-        one = Demonstration(
-            assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, human_error_scale
-        )
+        one = Demonstration(assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, human_error)
         each.append(observe(one, noise, rng))
     return _stacked(each, n, k)
 
@@ -182,7 +180,7 @@ def draw_pairs(
 ) -> Pairs:
     """Pairs of observation and truth; of several scenarios in turn.
 
-    No physics: a part is shown exactly where the hand puts it, with the human's carelessness. The pairs are those that
+    No physics: a part is shown exactly where the hand puts it, with the human error. The pairs are those that
     `draw_endless_pairs` begins with, so more of them begin with the same ones.
 
     Args:
@@ -190,8 +188,8 @@ def draw_pairs(
         noise: As in `make_noise`.
         n: How many.
         seed: From 0. No layout and no error of it is one of a trial of a sweep or a track.
-        level: Standard deviation in mm and degrees, one number for both or a pair.
-        careless: 0 is a careful human, 1 the scenario's.
+        noise_level: Standard deviation in mm and degrees, one number for both or a pair.
+        human_error_scale: 0 for a human without error, 1 for the error that the scenario states.
 
     Raises:
         InputError: There is no such scenario or noise model, or a number is not allowed.
@@ -257,7 +255,7 @@ def seed_block(seed: int, scenario: str, number: int) -> np.random.Generator:
 
 
 def _mistakes(scenario: Scenario, human_error_scale: float, rng: np.random.Generator) -> Array:
-    """What a careless human adds to the goals, (BLOCK, k, 4, 4): as in a demonstration, in each of the layouts."""
+    """The human error of every pose, (BLOCK, k, 4, 4): as in a demonstration, in each of the layouts."""
     twists = np.zeros((BLOCK, len(scenario.assembly), 6))
     if (how := scenario.human_error) is not None:
         # how an error spreads is the same in every layout, and in proportion to it

@@ -24,6 +24,7 @@ from apo_bench.benchmark.analysis import (
     rank_method,
 )
 from apo_bench.benchmark.analysis.over_seeds import PooledRate
+from apo_bench.io import format_count
 from apo_bench.records import CORRECTOR, knows_truth, uses_contacts
 from apo_bench.records.run.trials import trials_of
 
@@ -104,7 +105,7 @@ def _named(who: _Who) -> str:
 def _counted(who: _Who, own: PooledRate) -> str:
     """`95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %)`."""
     between = "" if own.seeds < FEWEST_SEEDS else f"; 95 % interval {format_percent_interval(own.interval)}"
-    trials = f"{own.trials:,} trial{'s' * (own.trials != 1)}"
+    trials = format_count(own.trials, "trial")
     return f"{_named(who)} succeeds in {own.right:,} of {trials} ({format_percent(own.right / own.trials)}{between})."
 
 

@@ -123,8 +123,9 @@ class SweepConfig(_Axes):  # type: ignore[misc]  # made from the settings, so th
 
 
 def as_tuple(values: Any) -> tuple[Any, ...]:
-    """One value or several as a tuple: a text is one name."""
-    return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
+    """One value or several as a tuple: a text is one name, a list in a list a pair."""
+    several = values if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
+    return tuple(tuple(each) if isinstance(each, list) else each for each in several)
 
 
 def _plain(value: Any) -> Any:

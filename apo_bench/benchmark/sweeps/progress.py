@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from apo_bench.io import format_count
+
 Count = Callable[[], None]
 """Called for every trial that has ended."""
 EVERY_S = 60.0
@@ -42,7 +44,9 @@ def _lines(total: int) -> Count:
             printed = now
             gone_min = (now - began) / 60
             left_min = gone_min * (total - ended) / ended
-            sys.stderr.write(f"{ended} of {total} trials in {gone_min:.0f} min, about {left_min:.0f} min to go\n")
+            sys.stderr.write(
+                f"{ended} of {format_count(total, 'trial')} in {gone_min:.0f} min, about {left_min:.0f} min to go\n"
+            )
             sys.stderr.flush()
 
     return count

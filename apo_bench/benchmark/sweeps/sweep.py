@@ -76,6 +76,19 @@ def run_sweep(
         InputError: A setting that is not allowed, or a folder with trials of another sweep.
         RuntimeError: A trial could not be run, or a record could not be written.
         KeyboardInterrupt: After Ctrl-C or a signal; the records of the batches that had ended are written.
+
+    Examples:
+        >>> import apo_bench, tempfile
+        >>> grid = apo_bench.SweepConfig(
+        ...     "block_on_block",
+        ...     noise_level=1,
+        ...     human_error_scale=0,
+        ...     method="contact",
+        ...     trials=1,
+        ...     fidelity="near-contact",
+        ... )
+        >>> [record["success"] for record in apo_bench.run_sweep(grid, tempfile.mkdtemp())]
+        [True]
     """
     grids = (grids,) if isinstance(grids, SweepConfig) else tuple(grids)
     _check_executor(workers, limit_s, backend, address)

@@ -20,7 +20,7 @@ import msgspec
 from msgspec import UNSET
 
 from apo_bench.arguments import check_arguments
-from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED, SweepConfig, as_tuple
 from apo_bench.errors import InputError
 from apo_bench.io import FileTable, Positive, convert_typed, read_plain
 from apo_bench.records import SETTINGS, convert_to_python_units
@@ -91,10 +91,4 @@ def _grid(name: str, values: Mapping[str, Any]) -> SweepConfig:
 def _values(table: msgspec.Struct) -> dict[str, Any]:
     """The values of the keys that a table has."""
     stated = {key: value for key, value in msgspec.structs.asdict(table).items() if value is not UNSET}
-    return {key: _several(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"}
-
-
-def _several(value: Any) -> tuple[Any, ...]:
-    """One value or several."""
-    entries = value if isinstance(value, list) else (value,)
-    return tuple(tuple(entry) if isinstance(entry, list) else entry for entry in entries)
+    return {key: as_tuple(value) if key in _SEVERAL else value for key, value in stated.items() if key != "also"}

@@ -16,7 +16,7 @@ from apo_bench.geometry import is_held, measure_extent
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.importers.assembly.staging import find_stance
 from apo_bench.importers.assembly.touching import walls_without_play
-from apo_bench.io import read_bytes
+from apo_bench.io import format_count, read_bytes
 from apo_bench.records import TrialConfig
 from apo_bench.scenario import Scenario, list_nominal_operations, load_scenario, place_layout
 from apo_bench.simulation.arm_checks.placing import place_in_reach
@@ -116,7 +116,8 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
     failures = list(_trials(replace(config, clearance_mm=scene.clearance_mm), scenario, scene, seeds))
     yield from (Finding("oracle", False, sentence) for sentence in failures)
     if seeds:
-        sentence = f"{seeds - len(failures)} of {seeds} trials in which the robot knows the truth are right"
+        counted = f"{seeds - len(failures)} of {format_count(seeds, 'trial')}"
+        sentence = f"{counted} in which the robot knows the true poses succeeded"
         yield Finding("oracle", not failures, sentence)
 
 

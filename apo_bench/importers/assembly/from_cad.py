@@ -1,6 +1,8 @@
 """Import the parts of an assembly from CAD files that were drawn in one frame, with the place of every copy."""
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +18,18 @@ from apo_bench.importers.cad.solids import Mesh, RawSolid, Region, SolidPlace, c
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005
 """A share of the width of the box."""
+
+
+@contextmanager
+def remove_on_failure(folder: Path) -> Iterator[Path]:
+    """A folder for the parts of an assembly; it is removed again if the import fails and it did not exist before."""
+    existed = folder.exists()
+    try:
+        yield folder
+    except BaseException:
+        if not existed:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def import_parts(files: Sequence[Path], folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:

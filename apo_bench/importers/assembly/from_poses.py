@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from apo_bench.errors import require
 from apo_bench.importers.assembly.new_scenario import NewScenario
-from apo_bench.importers.assembly.posed import read_posed
+from apo_bench.importers.assembly.posed import UPS, read_posed
 from apo_bench.importers.assembly.upright import new_upright_scenario
 from apo_bench.importers.assembly.writing import write_scenario
 
@@ -27,8 +28,9 @@ def scenario_from_poses(
         poses: A file of `[[pose]]` entries.
         parts: Part files; empty: as the poses name them.
         source: What the poses come from, for the file.
-        up, fixed, order, clearance_mm, max_overlap_mm: As in `import_parts`.
+        up, fixed, order, clearance_mm, max_overlap_mm: As in `apo_bench.import_assembly`.
     """
+    require(up is None or up in UPS, f"up must be one of {', '.join(UPS)}, got {up}.")
     made = new_upright_scenario(read_posed(poses, list(parts)), up, tuple(fixed), clearance_mm, max_overlap_mm, order)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
     return made

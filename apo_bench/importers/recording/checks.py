@@ -104,5 +104,5 @@ def check_moved(
                 f"{np.degrees(np.linalg.norm(twist[3:])):.0f} deg during operation {k + 1} "
                 f"('{assembly.operations[k].main}'), which should not move it, {deviations:.0f} standard deviations of "
                 "where it was observed; if it was hidden or flipped by the tracker, leave those poses out, or state "
-                f"when operations ended by --ends (moves in the log: {describe_moves(intervals)})."
+                f"when operations ended by --operation-ends (moves in the log: {describe_moves(intervals)})."
             )

@@ -37,7 +37,7 @@ def _rivals(arrangement: Arrangement) -> Iterator[str]:
         if mine is not None and other is not None and mine is not other:
             yield (
                 f"operation {k + 1} ({mine.part}) ended at {mine.begins:.2f} s or {other.begins:.2f} s, which are "
-                "about as likely; state the right times by --ends"
+                "about as likely; state the right times by --operation-ends"
             )
 
 
@@ -57,7 +57,8 @@ def _pauses(intervals: RestIntervals, arrangement: Arrangement, assembly: Assemb
     for part, known in intervals.items():
         pauses = [f"{each.begins:.2f} s" for each in known[1:] if each not in arrangement.order.intervals]
         if pauses and part not in carried:
-            yield f"'{part}' also rested at {', '.join(pauses)}, counted as pauses; state --ends if it was put down"
+            times = ", ".join(pauses)
+            yield f"'{part}' also rested at {times}, counted as pauses; state --operation-ends if it was put down"
 
 
 def _hidden(intervals: RestIntervals) -> Iterator[str]:

@@ -32,7 +32,8 @@ def draw_recording(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 6.4), layout="constrained")
-    axes = figure.add_subplot(1, 2, 1, projection="3d", title="axes: x red, y green, z blue; m")
+    axes = figure.add_subplot(1, 2, 1, projection="3d", title="axes: x red, y green, z blue")
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     X = np.eye(4) if T_world_camera is None else T_world_camera
     _draw_frame(axes, X, 0.12, "camera")
     if T_world_camera is not None:

@@ -99,14 +99,17 @@ def stated_order(assembly: Assembly, intervals: RestIntervals, ends: Sequence[fl
     """
     require(
         len(ends) == len(assembly),
-        f"--ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.",
+        f"--operation-ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.",
     )
     chosen = list[RestInterval]()
     for k, (operation, t) in enumerate(zip(assembly.operations, ends, strict=True)):
         known = intervals[operation.main]
         found = [each for each in known if each.begins <= t <= each.ends]
         rests = ", ".join(f"{each.begins:.2f} to {each.ends:.2f}" for each in known[:12])
-        require(found, f"--ends: '{operation.main}' of operation {k + 1} does not rest at {t:g} s; it rests {rests}.")
+        require(
+            found,
+            f"--operation-ends: '{operation.main}' of operation {k + 1} does not rest at {t:g} s; it rests {rests}.",
+        )
         chosen.append(found[0])
     return Order(tuple(chosen), None)
 
@@ -145,7 +148,7 @@ def _best_choices(
                 f"the moves of the log ({describe_moves(intervals)}) have another order than the operations of the "
                 f"scenario: '{operation.main}', which operation {k + 1} moves, rests from {rests} on; none of these "
                 "follows the others; check the ids in the objects file and that the log begins before the first part "
-                "is taken, or state --ends, or --unseen for operations that the log does not show."
+                "is taken, or state --operation-ends, or --unobserved for operations that the log does not show."
             )
         choices = [each for ending in by_end.values() for each in _best_two(ending)]
     return _best_two(choices)

@@ -46,6 +46,12 @@ def read_arm(path: str | Path) -> Arm:
 
     Raises:
         InputError: A fault of the file or of the models that it names.
+
+    Examples:
+        >>> import apo_bench
+        >>> from apo_bench.resources import folder
+        >>> apo_bench.read_arm(folder("assets") / "arms" / "six_axis.toml").tip
+        'tip'
     """
     return read_described(read_description(Path(path)))
 

@@ -95,7 +95,7 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
 
 
 def _draw(how: HumanError | None, human_error: float, rng: np.random.Generator) -> Array:
-    """The offset of the careless operation, (3,) [m], in the part's own frame."""
+    """The offset of the operation with the human error, (3,) [m], in the part's own frame."""
     sign = rng.choice([-1.0, 1.0])
     size = rng.uniform(0.0, 1.0)
     if how is None:

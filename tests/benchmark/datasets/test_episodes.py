@@ -80,7 +80,7 @@ def test_the_card_says_what_every_column_is(made: Path) -> None:
     for column, field in FRAMES.items():
         assert f"| `{column}` | " in card
         assert f"| {field.unit} | {field.frame} | {field.meaning} |" in card
-    assert "2 simulated trials, 2 of them right" in card
+    assert "2 simulated trials, 2 right" in card
     assert "Licence: Apache-2.0" in card
 
 
@@ -135,6 +135,6 @@ def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monk
     monkeypatch.setattr(making, "replays", signalled)
     words = ["dataset", "make", "block_on_block", "--episodes", "3", "--format", form, "--out", str(tmp_path / "out")]
     assert main(words) == 128 + signal.SIGTERM
-    assert "1 simulated trials" in (tmp_path / "out" / "README.md").read_text()
+    assert "1 simulated trial," in (tmp_path / "out" / "README.md").read_text()
     assert not (tmp_path / "out" / "UNFINISHED").exists()
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL

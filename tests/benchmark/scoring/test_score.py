@@ -77,6 +77,15 @@ def test_an_entry_that_is_there_is_continued_and_made_the_same(small: Path) -> N
     assert (small / "once.json").read_bytes() == first
 
 
+def test_a_score_never_deletes_another_track(small: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scored(small, "one", "uncorrected")
+    first = (small / "one.json").read_bytes()
+    (small / "other.toml").write_text(SMALL)
+    assert main(["score", "uncorrected", "--track", "other.toml", "--out", "one.json", "--workers", "1"]) == 2
+    assert "would delete: small; add them with --track" in capsys.readouterr().err
+    assert (small / "one.json").read_bytes() == first
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

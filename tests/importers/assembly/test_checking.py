@@ -36,7 +36,7 @@ def test_all_is_well_and_the_robot_that_knows_the_truth_succeeds(folder: Path) -
         *("file", "parts", "starts", "ways", "play", "gripper", "reach", "oracle")
     ]
     assert findings[0].sentence.startswith("2 parts, 1 operations, 1 contacts (1 plane on plane)")
-    assert str(findings[-1]) == "ok     oracle   1 of 1 trials in which the robot knows the truth are right"
+    assert str(findings[-1]) == "ok     oracle   1 of 1 trial in which the robot knows the true poses succeeded"
 
 
 def test_a_site_that_is_too_far_is_named_with_one_in_reach(folder: Path) -> None:

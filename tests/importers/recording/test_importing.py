@@ -125,7 +125,7 @@ def test_a_part_that_moves_during_the_operation_of_another_is_refused() -> None:
     with pytest.raises(
         InputError,
         match=r"log\.csv: 'castle1' moved by 30 mm and 0 deg during operation 3 \('stick'\), which should not move it, "
-        r"\d\d standard deviations .* state when operations ended by --ends",
+        r"\d\d standard deviations .* state when operations ended by --operation-ends",
     ):
         imported({**tracks, "castle1": aside})
     # An adjustment is counted into the error.

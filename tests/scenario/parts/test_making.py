@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+import shapely
 
 from apo_bench import InputError
 from apo_bench.geometry import Box
@@ -107,3 +108,15 @@ def test_a_rim_is_a_face_of_its_own(tmp_path: Path):
     wrong = plate().with_rim("rim", (5, -3, 0), (0, 0, -1), 5.0)
     with pytest.raises(InputError, match="faces, rim: pieces lie along 0%"):
         load_part(write_part("wrong", wrong, tmp_path, source="a test", licence="Apache-2.0"))
+
+
+def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
+    outline = make_polygon((0, 0), (30, 0), (30, 30), (15, 15.08), (0, 30))
+    body = extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 0, 8, "bore")])
+    solid = load_part(write_part("tight", body, tmp_path, source="a test", licence="Apache-2.0"))
+    assert list(solid.rounds) == ["bore"]
+    axis = shapely.Point(0.015, 0.008)
+    gaps = [shapely.MultiPoint(piece.corners[:, :2]).convex_hull.distance(axis) for piece in solid.pieces]
+    assert min(gaps) == pytest.approx(0.007, abs=1e-9)
+    with pytest.raises(ValueError, match="no convex area around the bore"):
+        extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 2, 8, sides=96)])

@@ -102,12 +102,6 @@ BROKEN = {
     "two bodies": ("</worldbody>", '<body name="other"/></worldbody>', "one <body>"),
     "an included file": ("<worldbody>", '<include file="x.xml"/><worldbody>', "<include> is given"),
     "too light": ('<geom type="box"/>', '<geom type="box" density="1"/>', "weighs 4.8e-05 kg"),
-    "far away": ('pos="0 0 0.03"', 'pos="0 0 1e9"', "none farther away than 10 m"),
-    "two names of a face": (
-        FOOT,
-        FOOT + '<site name="sole" pos="0.01 0 0"/>',
-        "site 'sole' lies on a face that another one marks",
-    ),
     "two pieces": ('pos="0 0 0.03"', 'pos="0 0 0.3"', "2 separate solids"),
 }
 

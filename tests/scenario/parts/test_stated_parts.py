@@ -54,11 +54,6 @@ FACES = {
         r"\1outline_mm = [[-20, -20, 0], [-20, -20, 10], [-20, 20, 10], [-20.1, 20, 0]]" + "\n",
         "within 0.001 mm of one plane",
     ),
-    "beside its sides": (
-        OUTLINE,
-        r"\1outline_mm = [[-20, -20, 0], [-20, -20, 11], [-20, 20, 11], [-20, 20, 0]]" + "\n",
-        "no side of a piece lies below the face",
-    ),
     "a wider bore": (r"radius_mm = 3.0\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
     "half a turn of nothing": (r"hole = true", "hole = true\nextent_deg = 180", "extent_deg below 360 and toward"),
     "a steeper cone": (r"radii_mm = \[4.0, 3.0\]", "radii_mm = [4, 3.2]", "of the wall"),

@@ -11,7 +11,7 @@ from apo_bench.benchmark.report.page.page import Section, page
 from apo_bench.benchmark.report.tables.table import Table, TableColumn, fill
 from apo_bench.benchmark.report.trials import NUMBERS
 from apo_bench.errors import InputError
-from apo_bench.io import write_file
+from apo_bench.io import format_count, write_file
 
 _AGREEMENT = (
     "The same trials in both: how often success is the same, with Wilson's interval, and how often stage and code of "
@@ -115,8 +115,8 @@ def _agreed(total: Line) -> str:
     return (
         f"Verdicts agree in {total['same_verdict']:,} of {total['trials']:,} ({rate}): "
         f"{total['right_in_first_alone']:,} right in the first alone, {total['right_in_second_alone']:,} in the second "
-        f"alone{counted}. All of them agree at {total['same_verdicts_in_all']:,} of {total['seeds']:,} "
-        f"seed{'s' * (total['seeds'] != 1)} ({sure})."
+        f"alone{counted}. All of them agree at {total['same_verdicts_in_all']:,} of "
+        f"{format_count(total['seeds'], 'seed')} ({sure})."
     )
 
 

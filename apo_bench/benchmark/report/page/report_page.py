@@ -13,6 +13,7 @@ from apo_bench.benchmark.report.page.page import Section, as_data, page
 from apo_bench.benchmark.report.pictures import FailurePicture
 from apo_bench.benchmark.report.tables.table import Table
 from apo_bench.benchmark.report.trials import why
+from apo_bench.io import format_count
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import limits_of, scenario_files
 from apo_bench.records.run.trials import Trials
@@ -126,11 +127,9 @@ def _scope(trials: Trials) -> str:
     names = ("scenario", "clearance_mm", "seed", "human_error_scale")
     tried = len(trials.groups(names).keys)
     excluded = len(trials.where(np.isnan(trials.number("success"))).groups(names).keys)
-    scenarios, methods, seeds = (_many(len(trials.distinct(x)), x) for x in ("scenario", "method", "seed"))
+    scenarios, methods, seeds = (format_count(len(trials.distinct(x)), x) for x in ("scenario", "method", "seed"))
     fidelity = ", ".join(sorted(trials.distinct("fidelity")))
-    left_out = f"{excluded:,} of {_many(tried, 'demonstration')} not right and left out."
-    return f"{len(trials):,} trials of {scenarios}, {methods} and {seeds}, fidelity {fidelity}. {left_out}"
-
-
-def _many(n: int, what: str) -> str:
-    return f"{n:,} {what}{'' if n == 1 else 's'}"
+    left_out = f"{excluded:,} of {format_count(tried, 'demonstration')} not right and left out."
+    return (
+        f"{format_count(len(trials), 'trial')} of {scenarios}, {methods} and {seeds}, fidelity {fidelity}. {left_out}"
+    )

@@ -6,7 +6,13 @@ from typing import Any
 from apo_bench.benchmark.analysis import Line, format_percent
 from apo_bench.benchmark.report.tables.table import Table, TableColumn, condition_columns, interval_columns
 
-_METHOD = (TableColumn("scenario", "scenario", words=True), TableColumn("method", "method", words=True))
+
+def _words(*names: str) -> tuple[TableColumn, ...]:
+    """Columns of words, which have the names of settings."""
+    return tuple(TableColumn(name, name, words=True) for name in names)
+
+
+_METHOD = _words("scenario", "method")
 
 
 def gap_table(lines: Sequence[Line]) -> Table:
@@ -67,12 +73,12 @@ def effort_table(lines: Sequence[Line]) -> Table:
             TableColumn("trials", "right"),
             TableColumn("extra_steps", "extra steps", text="{extra_steps:.1f}"),
             TableColumn("sim_time_s", "simulated", text="{sim_time_s:.0f} s"),
-            TableColumn("placed_part_shift_mm", "pushed at most", text="{placed_part_shift_mm:.2f} mm"),
+            TableColumn("placed_part_shift_mm", "placed part moved at most", text="{placed_part_shift_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
-            "Of successful trials: the operations that were undone and done again, the simulated time, and how far a "
-            "finished part was pushed at most."
+            "Of successful trials: the operations that were undone and done again, the simulated time, and largest "
+            "displacement of a placed part."
         ),
     )
 
@@ -99,8 +105,7 @@ def work_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            TableColumn("host", "host", words=True),
-            TableColumn("worker", "worker", words=True),
+            *_words("host", "worker"),
             TableColumn("trials", "rows"),
             TableColumn("busy_s", "busy [s]", text="{busy_s:.0f}"),
             TableColumn("rows_per_minute", "rows per minute", text="{rows_per_minute:.1f}"),
@@ -114,10 +119,7 @@ def calibration_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            TableColumn("scenario", "scenario", words=True),
-            TableColumn("noise", "noise", words=True),
-            TableColumn("contact_source", "contact_source", words=True),
-            TableColumn("method", "method", words=True),
+            *_words("scenario", "noise", "contact_source", "method"),
             TableColumn("planned", "n"),
             TableColumn("covered", "covered", text=share("covered")),
             TableColumn("fixed_mm", "fixed error [mm]", text="{fixed_mm:.3f}"),
@@ -168,11 +170,7 @@ def detection_table(lines: Sequence[Line]) -> Table:
     return Table(
         lines,
         (
-            TableColumn("scenario", "scenario", words=True),
-            TableColumn("noise", "noise", words=True),
-            TableColumn("pose_source", "pose_source", words=True),
-            TableColumn("contact_source", "contact_source", words=True),
-            TableColumn("human_error_scale", "human_error_scale", words=True),
+            *_words("scenario", "noise", "pose_source", "contact_source", "human_error_scale"),
             TableColumn("noise_mm", "noise [mm]", words=True),
             TableColumn("noise_deg", "noise [deg]", words=True),
             TableColumn("demonstrations"),
