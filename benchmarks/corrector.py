@@ -95,16 +95,11 @@ def measure(method: Any, observations: Sequence[Observation]) -> Measured:
         times = [ms / 100 for ms, _ in batches]
     else:
         correct(observations[0], method)
-        batches = [spend(partial(correct_one, observation, method)) for observation in observations]
+        batches = [spend(lambda o=observation: (correct(o, method),)) for observation in observations]
         times = [ms for ms, _ in batches]
     made = [correction for _, corrections in batches for correction in corrections][: len(observations)]
     lengths = [np.linalg.norm(whitened(o, c.poses)) for o, c in zip(observations, made, strict=True)]
     return Measured(float(np.median(times)), 1e3 * max(c.gap_after_m for c in made), np.array(lengths))
-
-
-def correct_one(observation: Observation, method: Any) -> Sequence[Correction]:
-    """Correct one observation."""
-    return (correct(observation, method),)
 
 
 def table_of_correctors(draws: int = 20) -> list[str]:

@@ -42,7 +42,6 @@ ORDER = ("demonstration", "correction, fit", "prediction", PHYSICS, "replay", "j
 STEPS = 400
 TASKS = {"robosuite Lift": 20, "gym-taskboard Pegs": 20}
 """Environments of other packages, and their actions in a second of simulated time."""
-OURS_HZ = 20
 PROGRAM = """
 import json, sys, time, warnings
 warnings.filterwarnings("ignore")
@@ -294,7 +293,7 @@ def page(found: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield from ("| environment | steps a second | Hz | times real time |", "|---|--:|--:|--:|")
     for name, rate in found["steps"].items():
-        hz = TASKS.get(name, OURS_HZ)
+        hz = TASKS.get(name, 20)
         yield f"| {name} | {rate:.0f} | {hz} | {rate / hz:.1f} |"
     if missing := [name for name in TASKS if name not in found["steps"]]:
         yield ""
