@@ -205,10 +205,6 @@ def test_bad_noise_files_are_refused(before: str, after: str, message: str, tmp_
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (
-            "1,0,1,good,1,2,3,4,5,6",
-            "line 2, column kind: inlier, turned, outlier or missed is needed, 'good' was given",
-        ),
         ("1,0,1,inlier,1,2,3,4,5,190", "line 2, column turn_along_deg: a number of at most 180.01 is needed"),
     ],
 )
