@@ -1,4 +1,4 @@
-"""The search for a hole: what it finds, and that it changes nothing where no hole is missed."""
+"""The search for a hole: what it finds where a peg is off, and where its path goes."""
 
 from functools import cache
 
