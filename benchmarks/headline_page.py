@@ -44,7 +44,7 @@ def page(
     outliers = sorted((c for c in summary.cells if c.noise != TrialConfig.noise), key=_order)
     robot = sorted((c for c in summary.cells if _is_of_robot(c, robot_scenarios(summary.cells))), key=_robot_order)
     other = [c for c in plain if c.method not in (*METHODS, *ROBOT_METHODS)]
-    oracle = [f"{c.successes} of {c.trials} ({c.scenario})" for c in plain if c.method == "oracle"]
+    oracle = [c for c in plain if c.method == "oracle"]
     return [
         "# The headline",
         "",
@@ -79,7 +79,8 @@ def page(
         "",
         *rates(other, ("method",), lambda c: (f"`{c.method}`",), lambda c: c.scenario),
         "",
-        f"Without any error `oracle`, which has the true poses, is right in {', '.join(oracle)}.",
+        f"Without any error `oracle`, which has the true poses, succeeds in {sum(c.successes for c in oracle)} of "
+        f"{sum(c.trials for c in oracle)} trials.",
         "",
         "## Pairs",
         "",
@@ -114,8 +115,8 @@ def _both(cell: ConditionResult) -> str:
 def _widths(trials: int) -> str:
     low, half, high = (compute_wilson_interval(round(share * trials), trials) for share in (0.0, 0.5, 1.0))
     return (
-        f"Of {trials} trials, 0 % has a 95 % interval (Wilson) of 0 to {100 * low.high:.0f} %, 50 % one of "
-        f"{100 * half.low:.0f} to {100 * half.high:.0f} %, 100 % one of {100 * high.low:.0f} to 100 %."
+        f"Wilson's 95 % intervals at {trials} trials: 0 % is 0 to {100 * low.high:.0f} %, 50 % is "
+        f"{100 * half.low:.0f} to {100 * half.high:.0f} %, 100 % is {100 * high.low:.0f} to 100 %."
     )
 
 
@@ -145,8 +146,8 @@ def _differences(pairs: Sequence[PairedComparison]) -> list[str]:
     heads = ("scenario", "human error", "noise, mm", "noise model", "method", "pairs", "it alone", "`paper` alone")
     return [
         f"Corrected poses and those of `paper` over the same seeds, in the {len(apart)} of {len(compared)} conditions "
-        "in which any seed ends differently. The columns count the seeds at which one method alone succeeded, then "
-        "give the difference in points with Tango's 95 % interval, and McNemar's exact p, adjusted for all (Holm).",
+        "in which any seed ends differently. *It alone* and *`paper` alone* count the seeds at which one method alone "
+        "succeeded. The difference is in points with Tango's 95 % interval; p is McNemar's, adjusted for all (Holm).",
         "",
         *table((*heads, "difference", "p adjusted"), lines),
     ]

@@ -24,10 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench import Assembly, Demonstration, draw_layout, load_scenario
-from apo_bench.assembly import Plan, compute_placements
+from apo_bench.assembly import Meetings, Plan, compute_placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array
-from apo_bench.judging.contacts import face_overlap
 from apo_bench.perception.observation.noise import NoiseLevel, make_noise
 from apo_bench.perception.observation.observing import observe
 from apo_bench.perception.observation.wrong_contacts import make_contacts, replace_contacts
@@ -68,7 +67,7 @@ def is_right(scenario: Scenario, shown: Demonstration, poses: Array) -> bool:
         return False
     for operation, placed in zip(assembly.operations, compute_placements(assembly, shown.start, poses), strict=True):
         flat = (c for c in operation.contacts if all(face in assembly.solids[part].faces for part, face in c))
-        if not all(face_overlap(assembly, contact, placed) for contact in flat):
+        if not all(Meetings(assembly).measure_overlaps((contact, placed) for contact in flat)):
             return False
     return not predict(Plan(assembly, shown.start, poses), CLEARANCE_MM, scenario.thresholds, scenario.attach).fails
 

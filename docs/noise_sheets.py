@@ -37,10 +37,13 @@ has the mean square of the human error, and is at least 0.05 mm and 0.05 degrees
 
 ## Errors and corrections
 
-All at noise level 1, without human error. *Errors* are standard deviations of 1,000 observations of {SCENARIO} in the
-frame of the ray from the camera, found / stated. The other columns are {TRIALS} corrections by `contact`: *complete*
-are observations of every operation, *test fails* counts the complete ones that the stated noise does not explain
-(chi-square test at 1 %), *position error* is the root mean square per axis, observed and corrected.
+All at noise level 1, without human error:
+
+- *across* to *about*: standard deviations of 1,000 observations of {SCENARIO} in the frame of the ray from the
+  camera, found / stated;
+- *complete*: how many of {TRIALS} observations have every operation; `contact` corrects these;
+- *test fails*: corrections that the stated noise does not explain (chi-square test at 1 %);
+- *position error*: root mean square per axis, observed and corrected.
 
 | noise | across, mm | along, mm | tilt, deg | about, deg | complete | test fails | position error, mm |
 |---|---|---|---|---|---|---|---|
@@ -49,9 +52,13 @@ FORMULAS = """
 
 ## Formulas
 
-T is the pose of a part in the world, exp(xi) the displacement of a twist (x, y, z, rx, ry, rz) in the frame of the
-part, e are independent standard normal numbers, and L is the noise level in mm and degrees. Tests hold every model to
-one set of laws: zero mean and the stated covariance over seeds, and no dependence on the world frame.
+- T: the pose of a part in the world.
+- exp(xi): the displacement of a twist (x, y, z, rx, ry, rz) in the frame of the part.
+- e: independent standard normal numbers.
+- L: the noise level in mm and degrees.
+
+Tests hold every model to one set of laws: zero mean and the stated covariance over seeds, and no dependence on the
+world frame.
 """
 
 

@@ -25,11 +25,12 @@ from apo_bench.assembly.graph import (
     compute_observed_residuals,
 )
 from apo_bench.assembly.joint_play import compute_apart_limit_mm, compute_deep_limit_mm, compute_joint_play_mm
+from apo_bench.assembly.meeting import Meeting, Meetings, measure_contact
 from apo_bench.assembly.observation import Observation
 from apo_bench.assembly.outlier_model import OutlierModel, make_measured_model
 from apo_bench.assembly.pattern import Pattern, find_contact_pattern, find_faces_away
 from apo_bench.assembly.plan import SCHEDULE_REMEDY, Plan, Step, find_schedule_fault, list_poses_in_force
-from apo_bench.assembly.poses import Poses, compute_placements
+from apo_bench.assembly.poses import Poses, compute_placements, list_alternatives
 from apo_bench.assembly.projection import project_observation, project_observations, project_round_faces
 from apo_bench.assembly.reached import Outcome, ProbingResult, ReachedState, ReplayResult, SlipInHand, Snapshot
 from apo_bench.assembly.resting_contacts import (
@@ -77,6 +78,8 @@ __all__ = (
     "Hypothesis",
     "Iterate",
     "Layout",
+    "Meeting",
+    "Meetings",
     "Node",
     "Observation",
     "Operation",
@@ -123,9 +126,11 @@ __all__ = (
     "find_touch_points",
     "find_touched_contacts",
     "invert",
+    "list_alternatives",
     "list_outline_points",
     "list_poses_in_force",
     "make_measured_model",
+    "measure_contact",
     "measure_entrance_depth",
     "measure_face_gap",
     "measure_height",

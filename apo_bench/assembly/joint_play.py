@@ -5,16 +5,28 @@ dovetail that lies on a receded floor has more room between its leaning walls. W
 it, so the largest gap is that of a linear program.
 """
 
+from collections.abc import Iterator
 from functools import lru_cache
 from math import cos, pi
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly.contact_kinds import classify_contact, compute_play_mm
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Array, Face, RoundFace, compute_overlap, find_direction_across, measure_mate, pose
+from apo_bench.geometry import (
+    Array,
+    Face,
+    FacePair,
+    Overlap,
+    RoundFace,
+    compute_overlaps,
+    find_direction_across,
+    measure_mate,
+    pose,
+)
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
@@ -22,6 +34,8 @@ _LEVER_MM = 30.0
 """Turns count as the way at this distance, so that all unknowns of the linear program are of one size."""
 _DIGITS = 6
 """Of a play in mm; what a program leaves behind them is rounding."""
+_ALONG = 1e-9
+"""Opening by a motion of size 1, in the units of the rows, that counts as none."""
 _ROUND_M = 9
 """Digits of a pose [m] that distinguish two layouts apart."""
 
@@ -99,38 +113,54 @@ def compute_apart_limit_mm(
 
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
-    """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones.
-
-    With normals n into the free side and points p a motion (v, w) opens n v + (p x n) w.
-    """
+    """The largest gap of one of some pairs of faces, [mm]; kept, since all trials of a seed share the true ones."""
     if not {classify_contact(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
     if classify_contact(*faces[which]) == "shaft in hole":
         return None
-    T = np.frombuffer(at).reshape(4, 4)
-    touches = [_touch(*pair, T, clearance_mm) for pair in faces]
-    # A small motion moves point p by v + w x p, of which n . (v + w x p) = n . v + (p x n) . w opens the contact.
-    rows = np.concatenate([_rows(touch) for touch in touches])
-    limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
-    widest = _widest(_rows(touches[which]), rows, limits)
+    rows, limits, owners = _touch_rows(faces, at, clearance_mm)
+    widest = _widest(rows[owners == which], rows, limits)
     return round(widest, _DIGITS) if np.isfinite(widest) else None
 
 
-def _rows(touch: _Touch) -> Array:
-    """By how much motions (v [mm], w [mm at the lever]) open a contact at each point, (k, 6)."""
-    return np.concatenate([touch.normals, np.cross(1e3 * touch.points, touch.normals) / _LEVER_MM], axis=1)
+@lru_cache(maxsize=64)
+def _touch_rows(
+    faces: tuple[tuple[AnyFace, AnyFace], ...], at: bytes, clearance_mm: float
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """By how much motions (v [mm], w [mm at the lever]) open pairs of faces at each point where they touch, (k, 6).
+
+    Also how deep each point may come, (k,), [mm], and the pair that it belongs to, (k,).
+    """
+    T = np.frombuffer(at).reshape(4, 4)
+    flat = [FacePair(a, T, b, np.eye(4)) for a, b in faces if isinstance(a, Face) and isinstance(b, Face)]
+    common = iter(compute_overlaps(flat))
+    touches = [_touch(a, b, T, clearance_mm, common) for a, b in faces]
+    owners = np.repeat(np.arange(len(touches)), [len(touch.points) for touch in touches])
+    points = np.concatenate([touch.points for touch in touches])
+    normals = np.concatenate([touch.normals for touch in touches])
+    # A small motion moves point p by v + w x p, of which n . (v + w x p) = n . v + (p x n) . w opens the contact.
+    rows = np.concatenate([normals, np.cross(1e3 * points, normals) / _LEVER_MM], axis=1)
+    return rows, np.array([touch.limit_mm for touch in touches])[owners], owners
 
 
 def _widest(own: Array, rows: Array, limits: Array) -> float:
     """The most that a motion opens by one of its own rows, (k, 6), if no row closes by more than its limit; infinite
     if one has no bound.
 
-    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves.
+    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves; none
+    where a shift along a normal is without bound, or opens as much as rows that are opposite allow at most.
     """
     from scipy.optimize import linprog
 
     if not len(own):
         return np.inf
+    # A shift along a normal goes on until the first row is at its limit.
+    rates = -rows[:, :3] @ own[:, :3].T
+    shift = np.where(rates > _ALONG, limits[:, None] / np.maximum(rates, _ALONG), np.inf).min(axis=0).max()
+    # No motion opens an own row by more than the limit of a row that is its opposite.
+    faced = (np.abs(rows[:, None] + own) < _ALONG).all(axis=2)
+    if shift >= np.where(faced, limits[:, None], np.inf).min(axis=0).max():
+        return float(shift)
     # maximise sum_k own_k x_k, with one motion x_k per own row, so that -rows x_k <= limits for each k: the programs
     # have nothing in common, so the matrix of all constraints is block diagonal.
     together = np.kron(np.eye(len(own)), -rows)
@@ -138,15 +168,16 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
     return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
 
 
-def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _Touch:
+def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float, common: Iterator[Overlap]) -> _Touch:
     """Where two faces touch.
 
     Args:
         T: The pose of the part that moves in the frame of the one that rests.
+        common: Gives the overlap, if both are flat.
     """
     fit_mm = clearance_mm * (moved.fit or rests.fit)
     if isinstance(moved, Face) and isinstance(rests, Face):
-        points = compute_overlap(moved, T, rests, np.eye(4)).corners
+        points = next(common).corners
         return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
     between = measure_mate(moved, T, rests, np.eye(4))
     if isinstance(rests, Face):

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import require_known
 from apo_bench.geometry import Array, pose
@@ -32,6 +34,17 @@ def compute_placements(assembly: Assembly, start: Poses, poses: Array) -> tuple[
         now[operation.main] = goal
         history.append(MappingProxyType(now))
     return tuple(history)
+
+
+def list_alternatives(poses: Poses) -> list[Poses]:
+    """The poses of each of several alternatives, (4, 4) per part.
+
+    Args:
+        poses: Of all, (r, 4, 4), or (4, 4) of parts that have one pose in all of them; at least one alternative.
+    """
+    count = max((len(T) for T in poses.values() if T.ndim == 3), default=1)
+    every = {part: np.broadcast_to(T, (count, 4, 4)) for part, T in poses.items()}
+    return [{part: T[i] for part, T in every.items()} for i in range(count)]
 
 
 def check_parts(assembly: Assembly, *placed: Poses) -> None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.contact_kinds import classify_contact
+from apo_bench.assembly.meeting import Meetings
 from apo_bench.assembly.poses import Poses
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import (
@@ -18,7 +19,6 @@ from apo_bench.geometry import (
     Array,
     Face,
     RoundFace,
-    compute_overlap,
     find_direction_across,
     pose,
 )
@@ -52,17 +52,23 @@ def find_touched_contacts(
     return touches
 
 
-def find_touch_points(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
+def find_touch_points(
+    assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses, known: Meetings | None = None
+) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
-    at each, (k, 3)."""
-    points = [np.zeros((0, 3))]
-    normals = [np.zeros((0, 3))]
-    for (m, e), _, n, at in touched:
-        if at is None:
-            at = compute_overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
-        points.append(at)
-        normals.append(np.tile(n, (len(at), 1)))
-    return np.concatenate(points), np.concatenate(normals)
+    at each, (k, 3).
+
+    Args:
+        known: What is measured already.
+    """
+    every = list(touched)
+    flat = iter(
+        (known or Meetings(assembly)).measure_overlaps((each.contact, poses) for each in every if each.points is None)
+    )
+    points = [next(flat).corners if each.points is None else each.points for each in every]
+    normals = [np.tile(each.normal, (len(at), 1)) for each, at in zip(every, points, strict=True)]
+    nothing = np.zeros((0, 3))
+    return np.concatenate([nothing, *points]), np.concatenate([nothing, *normals])
 
 
 def list_outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 
@@ -56,10 +57,27 @@ def straighten(ring: Array) -> Array:
 
     A sliver, such as a disc seen nearly edge-on, keeps its points where no three corners would be left.
     """
-    before = ring - np.roll(ring, 1, axis=0)
-    after = np.roll(ring, -1, axis=0) - ring
+    return ring[find_corners(ring, np.zeros(len(ring), dtype=np.intp))]
+
+
+def find_corners(points: Array, ring: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Which points of closed rings are no points in the middle of straight edges, (k,), as in `straighten`.
+
+    Args:
+        points: (k, 2), ring by ring, each point once, [m].
+        ring: (k,), the number of the ring of each point, ascending.
+    """
+    # The neighbours of a point are those beside it, but for the first and the last point of a ring, which meet.
+    last = np.append(ring[1:] != ring[:-1], True)[: len(ring)]
+    ends = last.nonzero()[0]
+    begins = np.append(0, ends + 1)[: len(ends)]
+    previous = np.arange(-1, len(ring) - 1)
+    following = np.arange(1, len(ring) + 1)
+    previous[begins], following[ends] = ends, begins
+    before = points - points[previous]
+    after = points[following] - points
     # before x after is twice the area of the triangle of three neighbours; over the chord, the height of the middle one
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    chord = np.maximum(np.linalg.norm(before + after, axis=1), _STRAIGHT_M)
-    corners = ring[np.abs(across) > _STRAIGHT_M * chord]
-    return corners if len(corners) > 2 else ring
+    chord = np.maximum(np.hypot(*(before + after).T), _STRAIGHT_M)
+    corners = np.abs(across) > _STRAIGHT_M * chord
+    return corners | (np.bincount(ring, corners, minlength=1) <= 2)[ring]

@@ -76,30 +76,30 @@ def make_turn(point: Array, axis: Array, angle_rad: float) -> Array:
 def find_least_turned(solid: Solid, T: Array, true: Array) -> Array:
     """The pose, (4, 4), at which a part of revolution looks as it does at T, turned the least from another pose.
 
-    Of that one the rotation (3, 3) is enough. Any other part stays as it is.
+    Of that one the rotation (3, 3) is enough; of several, (*, 3, 3), each has a pose, (*, 4, 4). Any other part stays
+    as it is.
     """
     about = find_revolution(solid)
     if about is None:
         return T
     # What is left between the two, M, is to turn the least: of both ways round, the turn about the axis with the
     # greatest trace. The centre of volume stays where it is observed.
-    M = true[:3, :3].T @ T[:3, :3]
+    M = np.swapaxes(true[..., :3, :3], -1, -2) @ T[:3, :3]
     a = about.axis
     across = find_direction_across(a)
-    flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if about.reversible else [np.eye(3)]
-    best = max((flip @ _least_turn(M @ flip, a) for flip in flips), key=lambda g: float(np.trace(M @ g)))
-    out = np.array(T)
-    out[:3, :3] = T[:3, :3] @ best
-    out[:3, 3] += T[:3, :3] @ (about.point - best @ about.point)
-    return out
+    flips = np.array([np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)][: 1 + about.reversible])
+    turns = flips @ _least_turn(M[..., None, :, :] @ flips, a)
+    traces = np.einsum("...ij,...fji->...f", M, turns)
+    best = np.take_along_axis(turns, traces.argmax(axis=-1)[..., None, None, None], axis=-3)[..., 0, :, :]
+    return pose.rigid(T[:3, :3] @ best, T[:3, 3] + (about.point - best @ about.point) @ T[:3, :3].T)
 
 
 def _least_turn(M: Array, axis: Array) -> Array:
-    """The rotation about an axis, (3, 3), for which M times it turns the least: the greatest trace."""
+    """The rotation about an axis, (*, 3, 3), for which M times it turns the least: the greatest trace."""
     # trace(M R(t)) = c + (trace(M) - a . M a) cos t + trace(M K) sin t, which is greatest at this t.
     K = pose.hat(axis)
-    angle = np.arctan2(np.trace(M @ K), np.trace(M) - axis @ M @ axis)
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+    angle = np.arctan2((M * K.T).sum(axis=(-2, -1)), np.trace(M, axis1=-2, axis2=-1) - (M @ axis) @ axis)
+    return np.eye(3) + np.sin(angle)[..., None, None] * K + (1.0 - np.cos(angle))[..., None, None] * (K @ K)
 
 
 def _about(face: RoundFace, point: Array, axis: Array) -> bool:
@@ -151,11 +151,12 @@ def _over(about: Revolution) -> Array:
 def find_nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
     """The pose, (4, 4), at which a solid looks as it does at T, turned least away from an expected pose (4, 4).
 
-    Any turn about an axis of revolution looks the same.
+    Of several expected poses, (*, 4, 4), each has a pose. Any turn about an axis of revolution looks the same.
     """
     if find_revolution(solid) is not None:
         return find_least_turned(solid, T, expected)
-    return np.asarray(T @ nearest_symmetry(find_symmetries(solid), (pose.inverse(expected) @ T)[None])[0])
+    off = (pose.inverse(expected) @ T).reshape(-1, 4, 4)
+    return np.asarray(T @ nearest_symmetry(find_symmetries(solid), off).reshape(np.shape(expected)))
 
 
 def count_folds(symmetric: Array) -> Array:

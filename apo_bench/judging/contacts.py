@@ -1,7 +1,7 @@
 """Measure the contacts of an assembly on the nominal faces at the poses that were reached."""
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+import math
+from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -10,12 +10,14 @@ from apo_bench.assembly import (
     Assembly,
     Contact,
     ContactKind,
+    Meeting,
+    Meetings,
     Poses,
     classify_contact,
     compute_apart_limit_mm,
     compute_deep_limit_mm,
 )
-from apo_bench.geometry import Face, Mate, Overlap, compute_overlap, measure_mate
+from apo_bench.geometry import Array, Mate, Overlap, compute_shares
 from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]
@@ -26,8 +28,6 @@ _OFF: dict[ContactKind, str] = {
     "cone in cone": "{:.2f} mm off its seat",
     "cone on rim": "{:.2f} mm off its seat",
 }
-Share = Callable[[Overlap, Overlap], float]
-"""How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
 
 class Gaps(NamedTuple):
@@ -67,33 +67,47 @@ class ContactVerdict(NamedTuple):
         return self.touching and self.covering
 
 
+class ContactCase(NamedTuple):
+    """A contact to be judged at one moment."""
+
+    contact: Contact
+    operation: int
+    """That makes it, counted from 0."""
+    moment: ContactMoment
+    poses: Poses
+    """Where the parts are, world frame, [m]."""
+    true: Poses
+    """Where they are when it is made, if all goals are the true ones."""
+    anywhere: bool = False
+    """Whether the area of the overlap alone counts, wherever on the environment face it is."""
+
+
 class ContactJudge(NamedTuple):
     """The limits of a contact, at any moment."""
 
-    assembly: Assembly
+    known: Meetings
+    """The contacts, with what is measured already."""
     thresholds: Thresholds
     clearance_mm: float
 
-    def verdict(
-        self, contact: Contact, operation: int, moment: ContactMoment, poses: Poses, true: Poses, share: Share
-    ) -> ContactVerdict:
-        """Measure one contact.
+    def verdicts(self, cases: Sequence[ContactCase]) -> tuple[ContactVerdict, ...]:
+        """Measure contacts, all in one call."""
+        found = self.known.measure((c.contact, poses) for c in cases for poses in (c.poses, c.true))
+        common = [each.common if isinstance(each, Mate) else each for each in found]
+        shares = compute_covered_shares(common[::2], common[1::2], [case.anywhere for case in cases])
+        return tuple(self._verdict(*each) for each in zip(cases, found[::2], shares.tolist(), strict=True))
 
-        Args:
-            operation: That makes it, counted from 0.
-            poses: Where the parts are, world frame, [m].
-            true: Where they are when it is made, if all goals are the true ones.
-        """
+    def _verdict(self, case: ContactCase, lie: Meeting, covered: float) -> ContactVerdict:
         limits = self.thresholds
-        gaps, angle, common = _measure(self.assembly, contact, poses)
-        allowed, gap = self._nearest_limit(contact, operation, true, gaps)
-        covered = share(common, face_overlap(self.assembly, contact, true))
+        contact = case.contact
+        gaps, angle = _measure(self.known.assembly, contact, case.poses, lie)
+        allowed, gap = self._nearest_limit(case, gaps)
         covering = gap is not None and covered >= limits.overlap_fraction
         near = angle <= limits.loose_angle_deg and (gap is None or gap <= limits.loose_gap_mm)
         return ContactVerdict(
             contact,
-            operation,
-            moment,
+            case.operation,
+            case.moment,
             gap_mm=gap,
             angle_deg=angle,
             overlap=covered,
@@ -101,23 +115,22 @@ class ContactJudge(NamedTuple):
             covering=covering,
             loose=near and covering,
             allowed_mm=allowed,
-            kind=classify_contact(*map(self.assembly.face_of, contact)) or "plane on plane",
+            kind=classify_contact(*map(self.known.assembly.face_of, contact)) or "plane on plane",
         )
 
-    def _nearest_limit(
-        self, contact: Contact, operation: int, true: Poses, gaps: Gaps | None
-    ) -> tuple[float, float | None]:
+    def _nearest_limit(self, case: ContactCase, gaps: Gaps | None) -> tuple[float, float | None]:
         """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
-        deep = compute_deep_limit_mm(self.assembly, contact, *lengths)
-        if gaps is None:
-            return deep, None
-        apart = compute_apart_limit_mm(self.assembly, contact, operation, true, *lengths)
+        deep = compute_deep_limit_mm(self.known.assembly, case.contact, *lengths)
+        # faces may be farther apart than deep, so the smaller gap of the two needs no other limit
+        if gaps is None or gaps.apart_mm <= gaps.deep_mm:
+            return deep, None if gaps is None else gaps.deep_mm
+        apart = compute_apart_limit_mm(self.known.assembly, case.contact, case.operation, case.true, *lengths)
         return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
-    """`gap` and `compute_overlap`, each with what is wrong at the worst contact, if there is anything."""
+    """`gap` and `overlap`, each with what is wrong at the worst contact, if there is anything."""
     apart = [c for c in contacts if not c.touching]
     if apart:
         worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))
@@ -136,49 +149,39 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
         yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
 
 
-def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
-    """The overlap of the two faces of a contact; nothing, if they do not look at each other."""
-    if assembly.is_round(contact):
-        return _mate(assembly, contact, poses).common
-    m, e = contact
-    at = (np.ascontiguousarray(poses[end.part], dtype=np.float64).tobytes() for end in contact)
-    return _overlap(assembly.face(m), assembly.face(e), *at)
+def compute_covered_shares(reached: Sequence[Overlap], true: Sequence[Overlap], anywhere: Sequence[bool]) -> Array:
+    """How much of each true overlap is covered by the one that was reached, (k,), 0 to 1; 1 where the true is empty.
 
-
-@lru_cache(maxsize=512)
-def _overlap(m: Face, e: Face, at_m: bytes, at_e: bytes) -> Overlap:
-    """Remembered, since all trials of a seed share the true ones: two megabytes at most."""
-    T_m, T_e = (np.frombuffer(at).reshape(4, 4) for at in (at_m, at_e))
-    return compute_overlap(m, T_m, e, T_e)
-
-
-def _mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
-    m, e = contact
-    return measure_mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+    Args:
+        anywhere: Where the areas alone are compared, as in `ContactCase`.
+    """
+    area, whole = (np.array([overlap.area for overlap in of]) for of in (reached, true))
+    out = np.minimum(1.0, np.divide(area, whole, out=np.ones(len(whole)), where=whole > 0.0))
+    placed = [i for i, at_all in enumerate(anywhere) if not at_all]
+    out[placed] = compute_shares([reached[i] for i in placed], [true[i] for i in placed])
+    return out
 
 
 def _when(verdict: ContactVerdict) -> str:
     return f" after operation {verdict.operation + 1}" if verdict.moment == "made" else ""
 
 
-def _measure(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps | None, float, Overlap]:
-    """What is between the faces, angle between the normals or axes [degrees], and the overlap.
+def _measure(assembly: Assembly, contact: Contact, poses: Poses, lie: Meeting) -> tuple[Gaps | None, float]:
+    """What is between the faces, and the angle between the normals or axes [degrees].
 
-    Round faces are off, not apart or deep, but for shafts on planes.
+    Round faces are off, not apart or deep.
     """
-    if assembly.is_round(contact):
-        between = _mate(assembly, contact, poses)
-        off = 1e3 * between.gap_m
-        return Gaps(off, off) if between.common else None, float(np.degrees(between.angle_rad)), between.common
+    if isinstance(lie, Mate):
+        off = 1e3 * lie.gap_m
+        return Gaps(off, off) if lie.common else None, math.degrees(lie.angle_rad)
     plane = assembly.face(contact.manipulated).plane
     normal = assembly.face(contact.environment).normal
-    common = face_overlap(assembly, contact, poses)
     T_m = poses[contact.manipulated.part]
     T_e = poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
-    angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
-    if not common:
-        return None, angle, common
+    angle = math.degrees(math.acos(min(1.0, max(-1.0, float(-n @ T_e[:3, :3] @ normal)))))
+    if not lie:
+        return None, angle
     # Seen from the manipulated face, a corner on the plane of the other one is in front of it where the two are apart.
-    e = 1e3 * ((common.corners - T_m[:3, 3]) @ n + plane[3])
-    return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle, common
+    e = 1e3 * ((lie.corners - T_m[:3, 3]) @ n + plane[3])
+    return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle

@@ -5,16 +5,13 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.assembly import Assembly, ReachedState, Snapshot, compute_placements
-from apo_bench.geometry import Array, Overlap, pose
-from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict
-from apo_bench.judging.displaced import displacements
-from apo_bench.judging.finished import fixtures
+from apo_bench.geometry import Array, pose
+from apo_bench.judging.contacts import ContactCase, ContactJudge, ContactMoment, ContactVerdict
 from apo_bench.judging.judgement import Judgement, judgement
-from apo_bench.records import Thresholds
 
 
 def judge_demonstrated(
-    assembly: Assembly, reached: ReachedState, reference: Array, thresholds: Thresholds, clearance_mm: float
+    judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
 ) -> Judgement:
     """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
 
@@ -27,16 +24,17 @@ def judge_demonstrated(
     Args:
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
+        displaced: From `displacements`, [m].
     """
+    assembly = judge.known.assembly
     after = reached.after
     final = reached.final
-    judge = ContactJudge(assembly, thresholds, clearance_mm)
     states = [snapshot for snapshot in (*after, final) if snapshot is not None]
     return judgement(
         _contacts_when_made(judge, after, final, reference),
         states,
-        [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *_corners_at_end(assembly, reached))],
-        thresholds,
+        [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *displaced.items())],
+        judge.thresholds,
         all_made=len(states) == len(after) + 1,
     )
 
@@ -52,14 +50,14 @@ def _contacts_when_made(
     if first is None:
         return ()
     # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
-    true = compute_placements(judge.assembly, first.poses, reference)
-    out = []
-    for contact, made, lost in judge.assembly.relations():
+    true = compute_placements(judge.known.assembly, first.poses, reference)
+    cases = []
+    for contact, made, lost in judge.known.assembly.relations():
         moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                out.append(judge.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
-    return tuple(out)
+                cases.append(ContactCase(contact, made, moment, snapshot.poses, true[made]))
+    return judge.verdicts(cases)
 
 
 def _pushes(
@@ -76,9 +74,3 @@ def _pushes(
             at = {part: pose.apply(snapshot.poses[part], c)[0] for part, c in centroids.items()}
             yield from ((part, float(np.linalg.norm(at[part] - where))) for part, where in put.items())
             put.update({part: at[part] for part in moved})
-
-
-def _corners_at_end(assembly: Assembly, reached: ReachedState) -> Iterator[tuple[str, float]]:
-    """How far a corner of each part that is no fixture lies at most from where its last operation had put it, [m]."""
-    if reached.final is not None:
-        yield from displacements(assembly, reached.after, reached.final, fixtures(assembly))

@@ -1,10 +1,19 @@
 """How far parts moved after they were put: in the room, against each other, and where fixed parts say where to."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, Snapshot, find_touch_points, find_touched_contacts
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Meetings,
+    Poses,
+    ReachedState,
+    Snapshot,
+    find_touch_points,
+    find_touched_contacts,
+)
 from apo_bench.geometry import Array, Solid, find_least_turned, pose
 
 _ONE_WAY = 0.999
@@ -14,35 +23,41 @@ _HELD = 1e-3
 _PASSES = 4
 """Turns of two parts of revolution are undone in turn; one pass is exact where their axes are parallel or square."""
 
-_After = Sequence[Snapshot | None]
-
 
 def last_moves(assembly: Assembly) -> dict[str, int]:
     """Part -> the last operation that moves it, counted from 0."""
     return {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
 
 
-def displacements(
-    assembly: Assembly, after: _After, final: Snapshot, away: Collection[str]
-) -> Iterator[tuple[str, float]]:
-    """How far a corner of each part lies at most from where it was after the part's last operation, [m].
+def displacements(assembly: Assembly, reached: ReachedState, away: Collection[str]) -> dict[str, float]:
+    """How far a corner of each part lies at most at the end from where it was after the part's last operation, [m].
 
     A part of revolution may have turned about its axis.
 
     Args:
         away: Parts that do not count.
     """
+    moved = dict[str, float]()
+    if reached.final is None:
+        return moved
     for part, k in last_moves(assembly).items():
-        put = after[k]
+        put = reached.after[k]
         if put is not None and part not in away:
             solid = assembly.solids[part]
             at = _corners(solid)
-            T = find_least_turned(solid, final.poses[part], put.poses[part])
-            yield part, _farthest(pose.apply(T, at) - pose.apply(put.poses[part], at))
+            T = find_least_turned(solid, reached.final.poses[part], put.poses[part])
+            moved[part] = _farthest(pose.apply(T, at) - pose.apply(put.poses[part], at))
+    return moved
 
 
 def faults_of_place(
-    assembly: Assembly, after: _After, final: Snapshot, away: Collection[str], seen: Poses
+    known: Meetings,
+    after: Sequence[Snapshot | None],
+    final: Snapshot,
+    displaced: Mapping[str, float],
+    away: Collection[str],
+    seen: Poses,
+    allowed_mm: float,
 ) -> Iterator[tuple[str, float]]:
     """What moved and shows in the finished assembly: two parts in words, and how far a corner of either moved, [m].
 
@@ -52,22 +67,28 @@ def faults_of_place(
     these, as they say where it belongs. A whole on a plain support may stand anywhere.
 
     Args:
+        known: The contacts, with what is measured already.
+        displaced: From `displacements`, [m].
         away: Parts that do not count.
         seen: The final poses, each part turned by the symmetry by which its contacts are judged.
+        allowed_mm: Parts are passed over that moved no farther in the room.
     """
+    assembly = known.assembly
     last = last_moves(assembly)
-    room = dict(displacements(assembly, after, final, away))
     for parts, contacts in _standing(assembly, away).items():
         a, b = parts
+        moved = max(displaced.get(a, 0.0), displaced.get(b, 0.0))
+        if 1e3 * moved <= allowed_mm:
+            continue
         if a in assembly.fixed:
-            if b in room and _is_mate(assembly, contacts, b, seen):
-                yield f"{b} against {a}", room[b]
+            if b in displaced and _is_mate(assembly, contacts, b, seen):
+                yield f"{b} against {a}", displaced[b]
             continue
         put = after[max(last.get(a, 0), last.get(b, 0))]
         if put is not None:
-            held = _held(assembly, contacts, (a, b), final.poses[a], seen)
+            held = _held(known, contacts, (a, b), final.poses[a], seen)
             slid = _slid(assembly, (a, b), put.poses, final.poses, held)
-            yield f"{b} against {a}", min(slid, max(room.get(a, 0.0), room.get(b, 0.0)))
+            yield f"{b} against {a}", min(slid, moved)
 
 
 def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str], list[Contact]]:
@@ -109,13 +130,15 @@ def _turned_back(a: Solid, b: Solid, now: Array, before: Array) -> Array:
     return now
 
 
-def _held(assembly: Assembly, contacts: Sequence[Contact], parts: tuple[str, str], T: Array, seen: Poses) -> Array:
+def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], T: Array, seen: Poses) -> Array:
     """By how much twists (v, w) of the second part open contacts with the first one: rows of n (v + w x p), (k, 6).
 
     Args:
         T: The pose of the first part, in whose frame the twists are.
     """
-    points, normals = find_touch_points(assembly, find_touched_contacts(assembly, contacts, [parts[1]], seen), seen)
+    points, normals = find_touch_points(
+        known.assembly, find_touched_contacts(known.assembly, contacts, [parts[1]], seen), seen, known
+    )
     p = pose.apply(pose.inverse(T), points)
     n = normals @ T[:3, :3]
     return np.concatenate([n, np.cross(p, n)], axis=1)

@@ -1,20 +1,27 @@
 """Judge the finished assembly: what a person says who sees the end, whatever became of it on the way."""
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Poses, ReachedState, Relation, compute_placements
-from apo_bench.geometry import Array, Overlap, find_nearest_alike
-from apo_bench.judging.contacts import ContactJudge, Share, face_overlap
-from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Meetings,
+    Poses,
+    ReachedState,
+    Relation,
+    compute_placements,
+    list_alternatives,
+)
+from apo_bench.geometry import Array, find_nearest_alike, remember
+from apo_bench.judging.contacts import ContactCase, ContactJudge, compute_covered_shares
+from apo_bench.judging.displaced import faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
-from apo_bench.records import Thresholds
 
 
 def judge_finished(
-    assembly: Assembly, reached: ReachedState, reference: Array, thresholds: Thresholds, clearance_mm: float
+    judge: ContactJudge, reached: ReachedState, reference: Array, displaced: Mapping[str, float]
 ) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
@@ -28,25 +35,29 @@ def judge_finished(
     Args:
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
+        displaced: From `displacements`, [m].
     """
+    assembly = judge.known.assembly
     final = reached.final
     all_made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
     if final is None:
-        return judgement((), (), (), thresholds, all_made=False)
-    judge = ContactJudge(assembly, thresholds, clearance_mm)
+        return judgement((), (), (), judge.thresholds, all_made=False)
     away = fixtures(assembly)
+    limits = judge.thresholds
     true = compute_placements(assembly, final.poses, reference)[-1]
     seen = _as_meant(assembly, final.poses, true)
+    moved = faults_of_place(judge.known, reached.after, final, displaced, away, seen, limits.placed_part_shift_mm)
     return judgement(
-        tuple(judge.verdict(contact, k, "end", seen, true, share) for contact, k, share in _standing(assembly, away)),
+        judge.verdicts([ContactCase(c, k, "end", seen, true, fixed) for c, k, fixed in _standing(assembly, away)]),
         [final],
-        [(what, 1e3 * m) for what, m in faults_of_place(assembly, reached.after, final, away, seen)],
-        thresholds,
+        [(what, 1e3 * m) for what, m in moved],
+        limits,
         all_made=all_made,
-        disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
+        disturbed=[1e3 * m for m in displaced.values()],
     )
 
 
+@remember
 def fixtures(assembly: Assembly) -> frozenset[str]:
     """The parts that were used and put away.
 
@@ -69,11 +80,11 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
     return any(end.part in assembly.fixed for end in contact)
 
 
-def _standing(assembly: Assembly, away: frozenset[str]) -> Iterator[tuple[Contact, int, Share]]:
-    """Contacts that stand at the end, of parts that are no fixtures; what made them, what of an overlap counts."""
+def _standing(assembly: Assembly, away: frozenset[str]) -> Iterator[tuple[Contact, int, bool]]:
+    """Contacts that stand at the end, of parts that are no fixtures; what made them, whether they may be anywhere."""
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
-            yield contact, made, _share_of_area if _on_fixed(assembly, contact) else Overlap.share
+            yield contact, made, _on_fixed(assembly, contact)
 
 
 def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array:
@@ -85,32 +96,22 @@ def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array
     Returns:
         Not a number where faces that should touch do not meet in the truth itself, so that it cannot be one.
     """
-    contacts = tuple(_standing(assembly, fixtures(assembly)))
-    return np.array(
-        [_least_overlap(assembly, final, compute_placements(assembly, final, T)[-1], contacts) for T in references]
-    )
-
-
-def _least_overlap(
-    assembly: Assembly, final: Poses, true: Poses, contacts: Sequence[tuple[Contact, int, Share]]
-) -> float:
+    contacts = [(contact, anywhere) for contact, _, anywhere in _standing(assembly, fixtures(assembly))]
+    true = compute_placements(assembly, final, references.swapaxes(0, 1))[-1]
     seen = _as_meant(assembly, final, true)
-    least = 1.0
-    for contact, _, share in contacts:
-        expected = face_overlap(assembly, contact, true)
-        if not expected:
-            return math.nan
-        least = min(least, share(face_overlap(assembly, contact, seen), expected))
-    return least
+    count = len(references)
+    common = Meetings(assembly).measure_overlaps(
+        ((c, at) for each in (seen, true) for at in list_alternatives(each) for c, _ in contacts),
+    )
+    reached, expected = common[: len(common) // 2], common[len(common) // 2 :]
+    covered = compute_covered_shares(reached, expected, [anywhere for _, anywhere in contacts] * count)
+    covered[[not overlap for overlap in expected]] = np.nan
+    return np.asarray(covered.reshape(count, -1).min(axis=1, initial=1.0))
 
 
-def _as_meant(assembly: Assembly, final: Poses, true: Poses) -> Poses:
-    """Poses of parts turned by that of their symmetries which is nearest to the truth."""
+def _as_meant(assembly: Assembly, poses: Poses, true: Poses) -> Poses:
+    """Poses of parts turned by that of their symmetries which is nearest to the truth, or to each of several truths."""
     return {
         part: T if part in assembly.fixed else find_nearest_alike(assembly.solids[part], T, true[part])
-        for part, T in final.items()
+        for part, T in poses.items()
     }
-
-
-def _share_of_area(reached: Overlap, true: Overlap) -> float:
-    return min(1.0, reached.area / true.area) if true else 1.0

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,7 +24,13 @@ from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan,
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.finished import least_overlaps
-from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
+from apo_bench.planning.prediction.measures import (
+    ArmMove,
+    DrawnMeasure,
+    Measure,
+    drawn_measures,
+    measures,
+)
 from apo_bench.records import NO_ROBOT_ERROR, describe_outcome, parse_robot_error
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space
@@ -139,36 +145,42 @@ def plan_score(
     fits = dict[tuple[str, ...], float]()
     score = 0.0
     for each in explained:
-        assembly = _without(plan.assembly, each.dropped)
+        kept = replace(plan, assembly=_without(plan.assembly, each.dropped)) if each.dropped else plan
         if each.dropped not in fits:
-            fits[each.dropped] = _fit_share(replace(plan, assembly=assembly), where, arm, ends)
+            fits[each.dropped] = _fit_share(kept, where, arm, ends)
         truths = draw_truths(each, max(1, round(TRUTHS * each.weight)), rng)
-        score += each.weight * fits[each.dropped] * _cover_share(replace(plan, assembly=assembly), truths, where)
+        score += each.weight * fits[each.dropped] * _cover_share(kept, truths, where)
     return score
 
 
 def _by_arm(
     plan: Plan, scene: Scene, robot_error: str, spiral: bool, probing: bool
-) -> tuple[list[tuple[Poses, ...]], tuple[ArmMove, ...]]:
-    """Where robots with drawn errors bring the parts, and the moves of the arm."""
+) -> tuple[tuple[Poses, ...], tuple[ArmMove, ...]]:
+    """Where robots with drawn errors bring the parts, as in `drawn_measures`, and the moves of the arm."""
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
-    from apo_bench.trial.robot_draws import brought, left_after_feeling
+    from apo_bench.trial.robot_draws import brought, left_after_feeling, stack_errors
     from apo_bench.trial.stages import robot_error_of
 
     arm = arm_moves(plan, scene, spiral)
     slip = parse_robot_error(robot_error).in_hand
     right = not any(slip) if probing else robot_error == NO_ROBOT_ERROR
     if right or any(move.refused is not None for move in arm):
-        return [], arm
+        return (), arm
     errors = [robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS)]
     if probing:
         errors = [left_after_feeling(plan, scene, error, slip[1]) for error in errors]
-    return [brought(plan, scene, error, spiral) for error in errors], arm
+    return brought(plan, scene, stack_errors(errors), spiral), arm
 
 
 def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
     """Standard normal numbers of one of the robots that are drawn, of one stream."""
-    return np.asarray(_spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)[draw])
+    return np.asarray(_robot_draws(which, shape)[draw])
+
+
+@lru_cache(maxsize=16)
+def _robot_draws(which: int, shape: tuple[int, ...]) -> Array:
+    """Those of all robots, (robots, *shape); always the same."""
+    return _spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)
 
 
 def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator) -> Array:
@@ -204,8 +216,6 @@ def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Arr
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     """The assembly without dropped contacts."""
-    if not dropped:
-        return assembly
     left = {
         (relation.made, relation.contact)
         for relation, kept in zip(assembly.relations(), assembly.without(dropped), strict=True)
@@ -218,31 +228,34 @@ def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     return replace(assembly, operations=tuple(operations))
 
 
-def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Sequence[Poses]]) -> float:
+def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Poses]) -> float:
     """How surely all measures of a plan are within their limits, from 0 to 1.
 
     Args:
-        ends: Where robots bring the parts, one with each of the drawn errors; none: as planned.
+        ends: Where robots with drawn errors bring the parts, as in `drawn_measures`; none: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.target_poses, strict=True)]
     less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
-    every = partial(measures, plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
-    stands = np.prod([_within(each, less_mm) for each in every() if each.kind in _WEIGHED or not ends])
-    near = [np.prod([_within(each, less_mm) for each in every(brought=end)]) for end in ends]
-    return float(stands * np.mean(near or 1.0))
+    lengths = where.clearance_mm, scenario.thresholds
+    planned = measures(plan, *lengths, scenario.attach, arm=arm)
+    stands = np.prod([_within(each, less_mm) for each in planned if each.kind in _WEIGHED or not ends])
+    if not ends:
+        return float(stands)
+    drawn = drawn_measures(plan, *lengths, scenario.attach, arm, ends)
+    return float(stands * np.array([_within(each, less_mm) for each in drawn]).prod(axis=0).mean())
 
 
-def _within(measure: Measure, less_mm: Sequence[float]) -> float:
-    """How surely one measure is.
+def _within(measure: Measure | DrawnMeasure, less_mm: Sequence[float]) -> Array:
+    """How surely one measure is, (), or (r,) of several draws.
 
     Args:
         less_mm: By how much less than the judge what goes in allows, of each operation.
     """
-    if measure.kind in _WEIGHED:
-        return _FALLS if measure.exceeded else 1.0
+    if isinstance(measure, Measure) and measure.kind in _WEIGHED:
+        return np.asarray(_FALLS if measure.exceeded else 1.0)
     allowed = measure.allowed - (less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0)
-    return float(ndtr((allowed - measure.size) / _SLACK_MM))
+    return np.asarray(ndtr((allowed - measure.size) / _SLACK_MM))
 
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:

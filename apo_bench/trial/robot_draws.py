@@ -6,7 +6,8 @@ comes to rest on what carries it and against what it was slid to; where the hand
 centred there, too.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
@@ -24,6 +25,13 @@ _CENTRED = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 _PICK = 1
 """Of the key poses of a transfer; the last one is its goal."""
 _UP = np.array([0.0, 0.0, 1.0])
+_ERRORS = tuple(field.name for field in fields(RobotError))
+
+
+def stack_errors(errors: Sequence[RobotError]) -> RobotError:
+    """Several robots as one, for `brought`: each array has one more axis before the last ones of a pose, (r, ...)."""
+    hand_eye, joints, tool, in_hand = (np.array([getattr(each, name) for each in errors]) for name in _ERRORS)
+    return RobotError(hand_eye, joints, tool, in_hand.swapaxes(0, 1))
 
 
 def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -> tuple[Poses, ...]:
@@ -32,7 +40,8 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
     What is pushed in level floats on its way, as it is carried out.
 
     Args:
-        searches: As in `plan_moves`.
+        error: Of one robot, or of several from `stack_errors`, which have poses (r, 4, 4) of what they moved.
+        spiral: As in `plan_moves`.
     """
     resting = plan.start
     states = list[Poses]()
@@ -52,12 +61,11 @@ def brought(plan: Plan, scene: Scene, error: RobotError, spiral: bool = False) -
             continue
         floats = pose.at(t.floats * _UP) if t.into.level else np.eye(4)
         states.append(compute_transferred_poses(operation, floats @ put, resting))
-        alone = replace(plan.assembly, operations=(operation,))
-        resting = resting_poses(alone, operation, now)
+        resting = resting_poses(plan.assembly, operation, now)
         for grip in t.centring:
             tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.tool
             centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
-            resting = resting_poses(alone, operation, compute_transferred_poses(operation, centred, resting))
+            resting = resting_poses(plan.assembly, operation, compute_transferred_poses(operation, centred, resting))
     return tuple(states)
 
 
@@ -84,13 +92,14 @@ def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: fl
 
 
 def _held(grip: Grip, tip: Array, T_part: Array) -> Array:
-    """How a part that stands at T_part is off in the hand once its pads have closed at a tip, in its frame, (4, 4)."""
+    """How a part that stands at T_part is off in the hand once its pads have closed at a tip, in its frame."""
     return np.asarray(pose.exp(_CENTRED * pose.log(pose.inverse(tip) @ T_part @ grip.T_part_tip)))
 
 
 def _leant(scene: Scene, q: Array, error: RobotError) -> Array:
-    """Where wrong zeros of the joints take the tip at joint angles q, a displacement of the world, (4, 4)."""
+    """Where wrong zeros of the joints take the tip at joint angles q, a displacement of the world, (*, 4, 4)."""
     if not error.joints.any():
         return np.eye(4)
-    right = scene.kinematics.forward(q)
-    return np.asarray(scene.kinematics.forward(q + error.joints) @ pose.inverse(right))
+    right = pose.inverse(scene.kinematics.forward(q))
+    wrong = [scene.kinematics.forward(q + each) for each in error.joints.reshape(-1, len(q))]
+    return np.asarray(np.array(wrong).reshape(*error.joints.shape[:-1], 4, 4) @ right)

@@ -1,5 +1,6 @@
 """How well fitted noise fits: histograms with the fitted densities, and quantiles against quantiles."""
 
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from apo_bench.perception.observation.models import MeasuredNoise, Residuals
 _OBSERVED = "#9fb8d1"
 _FITTED = "#a6341b"
 _BINS = 40
+_LETTERS = 120  # in a line of the title
 _SHOWN = 0.995  # quantile up to which a histogram is drawn
 
 
@@ -38,7 +40,7 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     axes[1, 0].set_ylabel("observed")
     axes[0, 0].legend(frameon=False)
     rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
-    title = f"{measured.source[:110]}\n{int(upright.sum())} inliers that are not turned; {rates}"
+    title = f"{textwrap.fill(measured.source, _LETTERS)}\n{int(upright.sum())} inliers that are not turned; {rates}"
     figure.suptitle(title, fontsize=11)
     save_figure(figure, path, dpi=120)
 

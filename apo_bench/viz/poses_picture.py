@@ -7,10 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Poses, build_relation_graph, compute_arc_residuals, compute_placements
+from apo_bench.assembly import (
+    Meetings,
+    Observation,
+    Poses,
+    build_relation_graph,
+    compute_arc_residuals,
+    compute_placements,
+)
 from apo_bench.geometry import Array
 from apo_bench.io import save_figure, use_figure_style
-from apo_bench.judging.contacts import face_overlap
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.scene import aim_camera, build_scene, draw_picture
@@ -47,7 +53,8 @@ def poses_panel(title: str, observation: Observation, poses: Array, step: int, w
         if e > observation.gap_m:
             wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
     for arc in graph.arcs:
-        if arc.lost is None and any(face_overlap(assembly, contact, placed).area <= 0.0 for contact in arc.contacts):
+        common = Meetings(assembly).measure_overlaps((contact, placed) for contact in arc.contacts)
+        if arc.lost is None and not all(common):
             wrong.append(f"{arc}: no overlap")
     return PosesPanel(title, placed, max(residuals, default=0.0), tuple(wrong), warning)
 

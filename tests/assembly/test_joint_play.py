@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from apo_bench import Scenario, load_scenario
-from apo_bench.assembly import Contact, Poses, classify_contact, compute_joint_play_mm, compute_placements
-from apo_bench.geometry import Overlap, measure_intrusion_depths, pose
-from apo_bench.judging.contacts import ContactJudge
+from apo_bench.assembly import Contact, Meetings, Poses, classify_contact, compute_joint_play_mm, compute_placements
+from apo_bench.geometry import measure_intrusion_depths, pose
+from apo_bench.judging.contacts import ContactCase, ContactJudge
 from apo_bench.planning.prediction.interference import physical_solids
 from apo_bench.records import Thresholds
 from tests.end_states import CASTLES, CLEARANCE_MM
@@ -111,8 +111,9 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
 
 def touching(scenario: Scenario, pair: Pair, poses: Poses) -> dict[Contact, bool]:
     contacts, made, true = pair
-    judge = ContactJudge(scenario.assembly, Thresholds(), scenario.clearance_mm)
-    return {c: judge.verdict(c, made, "made", poses, true, Overlap.share).touching for c in contacts}
+    judge = ContactJudge(Meetings(scenario.assembly), Thresholds(), scenario.clearance_mm)
+    verdicts = judge.verdicts([ContactCase(c, made, "made", poses, true) for c in contacts])
+    return {verdict.contact: verdict.touching for verdict in verdicts}
 
 
 def bounded(scenario: Scenario, pair: Pair) -> list[Contact]:

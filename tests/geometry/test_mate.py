@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import Face, RoundFace, pose
+from apo_bench.geometry import Face, RoundFace, compute_shares, pose
 from apo_bench.geometry.mating import measure_mate
 from tests.round_parts import cone, cylinder, rim, square, up
 from tests.scenes import mm
@@ -106,4 +106,4 @@ def test_the_world_does_not_matter(seed: int, pair: tuple[Face | RoundFace, Face
     for name in ("gap_m", "angle_rad", "rise_m", "length_m"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-9)
     assert there.off == pytest.approx(here.off @ W[:3, :3].T, abs=1e-9)
-    assert there.common.share(here.common) == pytest.approx(1.0, abs=1e-6)
+    assert compute_shares([there.common], [here.common]) == pytest.approx([1.0], abs=1e-6)

@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses
+from apo_bench.assembly import Assembly, Contact, Meetings, Operation, Poses
 from apo_bench.geometry import Array, Solid, measure_drop, measure_extent, pose
 from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.importers.assembly.staging import find_stance
@@ -143,7 +143,7 @@ class OrderSearch:
             > _FALLS_M
         ):
             return RemovalObstacle(1, f"nothing is below '{main}' that would carry it")
-        if imbalance(assembly, Operation(main, contacts, tuple(moves[1:])), poses) > BALANCED:
+        if imbalance(Meetings(assembly), Operation(main, contacts, tuple(moves[1:])), poses) > BALANCED:
             return RemovalObstacle(
                 2, f"'{main}' would not keep its balance on {others}, which would be there before it"
             )

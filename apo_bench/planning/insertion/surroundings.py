@@ -5,12 +5,13 @@ import numpy as np
 from apo_bench.assembly import (
     Assembly,
     Contact,
+    Meetings,
     Poses,
     find_touched_contacts,
     list_outline_points,
     measure_entrance_depth,
 )
-from apo_bench.geometry import Array, Face, compute_overlap, measure_extent
+from apo_bench.geometry import Array, Face, measure_extent
 from apo_bench.planning.insertion.arrival import Arrival
 
 _SLOW_M = 0.003
@@ -59,11 +60,10 @@ def slow_before(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) 
 
 def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> float:
     """How much of a way the faces of a contact have in common, [m]; 0 if nothing."""
-    m, e = contact
     if assembly.is_round(contact):
         ends = [list_outline_points(assembly, of, poses) @ way for of in contact]
         return max(0.0, float(min(end.max() for end in ends) - max(end.min() for end in ends)))
-    corners = compute_overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+    corners = Meetings(assembly).measure_overlaps([(contact, poses)])[0].corners
     return float(np.ptp(corners @ way)) if len(corners) else 0.0
 
 

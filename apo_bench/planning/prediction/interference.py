@@ -12,7 +12,6 @@ from apo_bench.geometry import (
     Solid,
     enclose_in_ball,
     measure_intrusion_depths,
-    pose,
     remember,
     shrink_pieces,
 )
@@ -41,11 +40,11 @@ def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
     return MappingProxyType(made)
 
 
-def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:
-    """How deep each part that moves comes into each one that rests and that it should not touch, [m].
+def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
+    """How deep each part that moves comes into each one that rests and that it should not touch, (r,) each, [m].
 
     Args:
-        planned: Every part where the plan has it after the operation.
+        planned: Every part where the plan has it after the operation, (4, 4), or where r robots bring it, (r, 4, 4).
         how: The way in; without it the goal alone is looked at.
 
     Returns:
@@ -57,7 +56,7 @@ def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, phys
     return [_deepest(physical[a], planned[a], physical[b], planned[b], back) for a, b in pairs]
 
 
-def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:
+def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[Array]:
     """How deep each part comes into each one that rests while it comes down to where a level way in begins, [m].
 
     Parts that it touches in the end count, too: there it has not come into them yet.
@@ -66,31 +65,47 @@ def depths_from_above(operation: Operation, planned: Poses, how: Attach | None, 
         As `depths_on_way`; `-FAR_M` of any other way in.
     """
     pairs = _pairs(operation, physical)
-    way = np.array([0.0, 0.0, 1.0]) if how is None else planned[operation.main][:3, :3] @ how.direction
-    if how is None or abs(way[2]) >= _LEVEL:
-        return [-FAR_M] * len(pairs)
-    down = _ABOVE_M[:, None] * np.array([0.0, 0.0, 1.0]) - how.travel_m * way
-    return [_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
+    goals = planned[operation.main].reshape(-1, 4, 4)
+    none = np.full(len(goals), -FAR_M)
+    if how is None:
+        return [none] * len(pairs)
+    ways = goals[:, :3, :3] @ how.direction
+    level = np.abs(ways[:, 2]) < _LEVEL
+    if not level.any():
+        return [none] * len(pairs)
+    down = _ABOVE_M[:, None] * np.array([0.0, 0.0, 1.0]) - how.travel_m * ways[:, None]
+    deepest = [_deepest(physical[a], planned[a], physical[b], planned[b], down) for a, b in pairs]
+    return [np.where(level, each, none) for each in deepest]
 
 
 def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
     return [(a, b) for a in operation.moves for b in physical if b not in operation.moves]
 
 
-def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float:
-    """The deepest intrusion over all displacements (k, 3) of a, [m]; far off ones are skipped."""
+def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> Array:
+    """The deepest intrusion over all displacements (r, k, 3) of a, of each of r robots, [m]; far off ones are skipped.
+
+    Args:
+        T_a, T_b: (4, 4), or (r, 4, 4).
+    """
+    T_a, T_b = (np.broadcast_to(T, (len(shifts), 4, 4)) for T in (T_a, T_b))
     middle, radius = enclose_in_ball(a.pieces)
-    seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, middle[None]) + shifts)
-    near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
-    if not near.any():
-        return -FAR_M
-    depths = measure_intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b, FAR_M)
-    return max(-FAR_M, float(depths.max()))
+    places = (T_a[:, :3, :3] @ middle + T_a[:, :3, 3] - T_b[:, :3, 3])[:, None] + shifts
+    seen_from_b = places @ T_b[:, :3, :3]
+    near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=2) < radius + FAR_M
+    out = np.full(len(shifts), -FAR_M)
+    for i in near.any(axis=1).nonzero()[0]:
+        at = T_a[i, :3, 3] + shifts[i, near[i]]
+        depths = measure_intrusion_depths(a.pieces, T_a[i, :3, :3], at, b.pieces, T_b[i], FAR_M)
+        out[i] = max(-FAR_M, float(depths.max()))
+    return out
 
 
 def _way_back(goal: Array, how: Attach | None) -> Array:
-    """From the goal back along the way in, (k, 3), world, [m]."""
+    """From goals, (4, 4) or (r, 4, 4), back along the way in, (r, k, 3), world, [m]."""
+    goals = goal.reshape(-1, 4, 4)
     if how is None:
-        return np.zeros((1, 3))
+        return np.zeros((len(goals), 1, 3))
     k = min(_MOST, 1 + int(np.ceil(how.travel_m / _SPACING_M)))
-    return -np.outer(np.linspace(0.0, how.travel_m, k), goal[:3, :3] @ how.direction)
+    ways = goals[:, :3, :3] @ how.direction
+    return -np.linspace(0.0, how.travel_m, k)[:, None] * ways[:, None]

@@ -10,17 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses, compute_placements
-from apo_bench.geometry import (
-    Array,
-    Face,
-    RoundFace,
-    all_boxes,
-    compute_overlap,
-    find_direction_across,
-    measure_mate,
-    pose,
-)
+from apo_bench.assembly import Assembly, Contact, Meeting, Meetings, Operation, Poses, compute_placements
+from apo_bench.geometry import Array, Face, Overlap, RoundFace, all_boxes, find_direction_across, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
@@ -56,37 +47,39 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
         The operation, or None if every part would stand.
     """
     every = zip(assembly.operations, compute_placements(assembly, start, goals), strict=True)
+    known = Meetings(assembly)
     return next(
-        (k for k, (operation, poses) in enumerate(every) if imbalance(assembly, operation, poses) > BALANCED), None
+        (k for k, (operation, poses) in enumerate(every) if imbalance(known, operation, poses) > BALANCED), None
     )
 
 
-def imbalance(
-    assembly: Assembly, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True
-) -> float:
+def imbalance(known: Meetings, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True) -> float:
     """How much of the weight of what moves, and of its moments over 10 mm, nothing balances, as in `first_unstable`.
 
     Args:
+        known: The contacts, with what is measured already.
         poses: Every part after the operation, world frame, [m].
         room_m: The centre of mass is also looked at this far off, level, in four directions; the largest counts.
         ceilings: Whether what lies above may push down; if not, nothing is claimed of an operation without any.
     """
+    assembly = known.assembly
     centroid = _centroid(assembly, operation, poses)
     offs = _ASIDE * room_m if room_m else _ASIDE[:1]
     if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):
-        return _of_normals(assembly, operation, poses, centroid + offs, ceilings)
-    points, signs, ups = _forces(assembly, operation, poses)
+        return _of_normals(known, operation, poses, centroid + offs, ceilings)
+    points, signs, ups = _forces(known, operation, poses)
     if not ups or not (ceilings or min(ups) < 0.0):
         return 0.0
     carrying = signs > (-np.inf if ceilings else 0.0)
     return max(_solve_balance(points[carrying], signs[carrying], centroid + off) for off in offs)
 
 
-def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
+def _of_normals(known: Meetings, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
     """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
     from scipy.optimize import nnls
 
-    pushing = [pushes(assembly, contact, poses) for contact in operation.contacts]
+    lies = known.measure((contact, poses) for contact in operation.contacts)
+    pushing = [pushes(known.assembly, *pair, poses) for pair in zip(operation.contacts, lies, strict=True)]
     normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
         return 0.0
@@ -101,22 +94,17 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
 
-def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:
+def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:
     """Where vertical forces may act, (k, 3), world, [m], and whether each pushes up (1) or down (-1), (k,).
 
     And the same of each contact that could carry weight, also of one that covers nothing.
     """
-    points = [np.zeros((0, 3))]
-    signs = [np.zeros(0)]
-    ups = list[float]()
-    for m, e in operation.contacts:
-        up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
-        if abs(up) >= _LEVEL:
-            corners = compute_overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
-            ups.append(float(np.sign(up)))
-            points.append(corners)
-            signs.append(np.full(len(corners), ups[-1]))
-    return np.concatenate(points), np.concatenate(signs), ups
+    heights = [float((poses[e.part][:3, :3] @ known.assembly.face(e).normal)[2]) for _, e in operation.contacts]
+    level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]
+    common = known.measure_overlaps(((contact, poses) for contact, _ in level))
+    ups = [float(np.sign(up)) for _, up in level]
+    points = np.concatenate([np.zeros((0, 3)), *(each.corners for each in common)])
+    return points, np.repeat(ups, [len(each.corners) for each in common]), ups
 
 
 def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
@@ -161,26 +149,30 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     return np.concatenate([points, *[held] * 4]), np.concatenate([n, *(m + side for side in sides)])
 
 
-def pushes(assembly: Assembly, contact: Contact, poses: Poses) -> Pushes:
-    """What the second part of a contact, which rests, can push the first one with."""
+def pushes(assembly: Assembly, contact: Contact, lie: Meeting, poses: Poses) -> Pushes:
+    """What the second part of a contact, which rests, can push the first one with.
+
+    Args:
+        lie: How the faces lie to each other, from `Meetings`.
+    """
     m, e = contact
     nothing = np.zeros((0, 3))
     moved = assembly.face_of(m)
     rests = assembly.face_of(e)
     T = poses[m.part]
     T_rests = poses[e.part]
-    if isinstance(moved, Face) and isinstance(rests, Face):
+    if isinstance(lie, Overlap):
+        assert isinstance(rests, Face)
         n = (T_rests[:3, :3] @ rests.normal)[None]
-        points = compute_overlap(moved, T, rests, T_rests).corners
-        return Pushes(points, np.repeat(n, len(points), axis=0), n)
-    between = measure_mate(moved, T, rests, T_rests)
-    at = between.points if between.common else nothing
+        return Pushes(lie.corners, np.repeat(n, len(lie.corners), axis=0), n)
+    at = lie.points if lie.common else nothing
     if isinstance(rests, Face):
         assert isinstance(moved, RoundFace)
         return _along(T_rests[:3, :3] @ rests.normal, at, -moved.radius)
     if isinstance(moved, Face):
         return _along(-T[:3, :3] @ moved.normal, at, rests.radius)
-    around, forces = _around(rests, between.axis, between.sine)
+    assert isinstance(moved, RoundFace)
+    around, forces = _around(rests, lie.axis, lie.sine)
     return Pushes(
         (at[:, None] + _radii(moved, T, rests, T_rests, at)[:, None, None] * around).reshape(-1, 3),
         np.tile(forces, (len(at), 1)),

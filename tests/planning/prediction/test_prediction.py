@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from apo_bench import Assembly, Plan
-from apo_bench.assembly import Step, compute_placements
+from apo_bench.assembly import Meetings, Step, compute_placements
 from apo_bench.geometry import Array, pose
 from apo_bench.planning.insertion.attach import Attach
 from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.planning.prediction.measures import ArmMove
-from apo_bench.planning.prediction.resting import is_support, residual, resting_poses
+from apo_bench.planning.prediction.resting import is_support, residuals, resting_poses
 from apo_bench.records import Thresholds
 from tests import rounds, scenes
 
@@ -100,7 +100,7 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
         touched = [c for c in operation.contacts if not alone.is_fit(c)]
         sides = [c for c in touched if not is_support(alone, c, rests)]
         for contact in touched:
-            e, _ = residual(alone, contact, rests)
+            e, _ = residuals(Meetings(alone), [contact], rests)[0][0]
             assert (e.min() if contact in sides else np.abs(e).max()) == pytest.approx(0.0, abs=2e-5)
         for part, T in rests.items():
             assert part in operation.moves or T is brought[part]
