@@ -122,8 +122,7 @@ def range_sensor(scene: Scene, simulated: SimulatedDemonstration, noise_mm: floa
     assert simulated.images is not None, "simulate the demonstration with pose_source='depth-camera'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.nominal_poses[:, :3, :3]
-    camera = simulated.images
-    return RangeSensor(camera.finder, camera.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
+    return RangeSensor(simulated.images.images, 1e-3 * noise_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
 
 
 def observe_demonstration(

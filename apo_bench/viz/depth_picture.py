@@ -7,6 +7,7 @@ import numpy as np
 
 from apo_bench.io import save_figure, use_figure_style
 from apo_bench.perception.depth_camera.follow import Event
+from apo_bench.perception.depth_camera.range_finder import VIEWS
 from apo_bench.viz.depth_run import DepthRun
 
 _TITLES = ("camera image", "depth [m]", "minus the depth before [mm]", "appeared, vanished", "fitted model")
@@ -62,6 +63,6 @@ def _draw_row(row: Any, run: DepthRun, event: Event, view: int) -> None:
     for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
         row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
     if event.found is not None and event.model is not None:
-        camera = run.watched.finder.views[view]
+        camera = VIEWS[view]
         distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
         row[4].contour(np.isfinite(distance.reshape(after.shape)), levels=[0.5], colors=_OUTLINE, linewidths=1.2)

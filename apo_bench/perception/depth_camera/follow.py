@@ -17,7 +17,7 @@ from apo_bench.geometry import (
     shrink_pieces,
 )
 from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
-from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
+from apo_bench.perception.depth_camera.range_finder import BIAS, VIEWS, PinholeView
 from apo_bench.perception.depth_camera.rays import RayCaster
 from apo_bench.perception.depth_camera.regions import Regions, find_changed_regions
 from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
@@ -65,7 +65,7 @@ class Expected:
 
 
 def follow_demonstration(
-    images: Sequence[Array], finder: RangeFinder, level_m: float, expected: Expected, cast: RayCaster
+    images: Sequence[Array], level_m: float, expected: Expected, cast: RayCaster
 ) -> tuple[Event, ...]:
     """Find every operation in range images, one per quiet spell, each (views, height, width), [m]; the first is before.
 
@@ -86,14 +86,12 @@ def follow_demonstration(
     k = 0
     first = 0
     while first + 1 < len(images) and k < len(assembly):
-        owners = [_find_owners(view, believed, cast) for view in finder.views]
+        owners = [_find_owners(view, believed, cast) for view in VIEWS]
         spell = _spell(images, first, level_m, assembly, k, owners)
         if spell is None:
             break
         last, which, compared, moved = spell
-        appearance = Appearance(
-            finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m, cast
-        )
+        appearance = Appearance(VIEWS, images[last], [r.appeared for r in compared], level_m, BIAS * level_m, cast)
         group = None if which is None else _moving_model(assembly, surfaces, believed, which)
         shares, located = _find_model(expected, surfaces, group, which, appearance)
         if which is not None and located is not None:

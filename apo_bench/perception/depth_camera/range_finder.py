@@ -1,7 +1,7 @@
 """The range finder: pinhole views, and the errors of its sensor."""
 
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, final
 
 import numpy as np
@@ -11,6 +11,14 @@ from apo_bench.geometry import Array, copy_frozen, pose
 
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
+BIAS = 0.1
+"""Standard deviation, over the level, of an error that all rays of one view and firing have in common: white noise
+averages out over a part, so this is what stays; a tenth, as repeated measurements of a fixed object differ by 0.1 to
+0.3 mm where one ray is good to a millimetre or two."""
+_GRAZING_DEG = 80.0
+"""Surfaces that are seen more obliquely send nothing back."""
+_DROPOUTS = 0.01
+"""Share of rays without an answer, at random."""
 
 
 @final
@@ -64,13 +72,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     return pose.rigid(np.stack([x, np.cross(z, x), z], axis=1), origin)
 
 
-@lru_cache(maxsize=4)
 def _two_views() -> tuple[PinholeView, ...]:
-    """From the left in front and from the right behind, 45 degrees high: together they cover every side of a part.
-
-    One view is not enough: of a stick that lies in a tower only its ends are visible, and only one of them from
-    either side. At 0.95 m a pixel is 3 mm wide.
-    """
     reach = 0.67
     height_m = 0.67
     at = np.array(VIEWED_POINT_M)
@@ -78,28 +80,27 @@ def _two_views() -> tuple[PinholeView, ...]:
     return tuple(PinholeView(look_at(at + way, at), 400, 300, 48.0) for way in ways)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class RangeFinder:
-    """A range finder and its errors. A level of L mm means a standard deviation of L mm per ray."""
+VIEWS = _two_views()
+"""From the left in front and from the right behind, 45 degrees high: together they cover every side of a part.
 
-    views: tuple[PinholeView, ...] = field(default_factory=_two_views)
-    bias: float = 0.1
-    """Standard deviation, over the level, of an error that all rays of one view and firing have in common: white noise
-    averages out over a part, so this is what stays; a tenth, as repeated measurements of a fixed object differ by 0.1
-    to 0.3 mm where one ray is good to a millimetre or two."""
-    grazing_deg: float = 80.0
-    """Surfaces that are seen more obliquely send nothing back."""
-    dropouts: float = 0.01
-    """Share of rays without an answer, at random."""
+One view is not enough: of a stick that lies in a tower only its ends are visible, and only one of them from either
+side. At 0.95 m a pixel is 3 mm wide.
+"""
 
-    def sense(self, image: RangeImage, level_m: float, rng: np.random.Generator) -> Array:
-        """What the sensor says, (views, height, width), [m]; NaN where it says nothing.
 
-        Unit draws are scaled by the level, so the same generator gives comparable errors at all levels.
-        """
-        unit = rng.standard_normal(image.distance.shape)
-        common = rng.standard_normal(len(image.distance))[:, None, None]
-        lost = rng.random(image.distance.shape) < self.dropouts
-        lost |= (image.cosine < np.cos(np.radians(self.grazing_deg))) | ~np.isfinite(image.distance)
-        return np.where(lost, np.nan, image.distance + level_m * (unit + self.bias * common))
+def sense(image: RangeImage, level_m: float, rng: np.random.Generator) -> Array:
+    """Measure true distances with errors.
+
+    Unit draws are scaled by the level, so the same generator gives comparable errors at all levels.
+
+    Args:
+        level_m: Standard deviation of a ray.
+
+    Returns:
+        (views, height, width), [m]; NaN where the sensor has no reading.
+    """
+    unit = rng.standard_normal(image.distance.shape)
+    common = rng.standard_normal(len(image.distance))[:, None, None]
+    lost = rng.random(image.distance.shape) < _DROPOUTS
+    lost |= (image.cosine < np.cos(np.radians(_GRAZING_DEG))) | ~np.isfinite(image.distance)
+    return np.where(lost, np.nan, image.distance + level_m * (unit + BIAS * common))

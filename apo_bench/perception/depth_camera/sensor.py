@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.geometry import Array, copy_frozen
 from apo_bench.perception.depth_camera.follow import Event, Expected, follow_demonstration
-from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
+from apo_bench.perception.depth_camera.range_finder import RangeImage, sense
 from apo_bench.perception.depth_camera.rays import MakeRayCaster
 from apo_bench.perception.observation.models import floor_covariance
 
@@ -27,7 +27,6 @@ class RangeSensor:
     and nothing else is taken from the plan.
     """
 
-    finder: RangeFinder
     images: tuple[RangeImage, ...]
     """Without error: before the demonstration and in every quiet spell."""
     level_m: float
@@ -60,11 +59,11 @@ class RangeSensor:
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:
         """The images with the errors of the sensor, (views, height, width) each, [m]."""
-        return [self.finder.sense(image, self.level_m, rng) for image in self.images]
+        return [sense(image, self.level_m, rng) for image in self.images]
 
     def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
         """What the sensor makes of measured images, operation by operation."""
         assembly = demonstration.assembly
         expected = Expected(assembly, demonstration.start, self.turns, self.play_m)
         cast = self.make_caster(assembly.solids, self.play_m)
-        return follow_demonstration(images, self.finder, self.level_m, expected, cast)
+        return follow_demonstration(images, self.level_m, expected, cast)

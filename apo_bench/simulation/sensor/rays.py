@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array, Solid, shrink_pieces
-from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
+from apo_bench.perception.depth_camera.range_finder import VIEWS, PinholeView, RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
 
@@ -63,13 +63,12 @@ class Sight:
         """Send out all rays of a view."""
         return cast_rays(self._model, self._own, view.origin, view.rays)
 
-    def range_image(self, finder: RangeFinder) -> RangeImage:
+    def range_image(self) -> RangeImage:
         """True distances in every view of the range finder."""
-        shape = (len(finder.views), finder.views[0].height, finder.views[0].width)
-        strikes = [self.strike(view) for view in finder.views]
+        shape = (len(VIEWS), VIEWS[0].height, VIEWS[0].width)
+        strikes = [self.strike(view) for view in VIEWS]
         cosine = [
-            np.abs(np.einsum("ni,ni->n", strike.normal, view.rays))
-            for strike, view in zip(strikes, finder.views, strict=True)
+            np.abs(np.einsum("ni,ni->n", strike.normal, view.rays)) for strike, view in zip(strikes, VIEWS, strict=True)
         ]
         distance = np.array([strike.distance for strike in strikes])
         return RangeImage(distance.reshape(shape), np.array(cosine).reshape(shape))

@@ -6,7 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
+from apo_bench.perception.depth_camera.range_finder import RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv_camera import Change, TvCamera
@@ -20,7 +20,6 @@ _STILL = 5e-5
 class DemonstrationImages:
     """What the range finder saw without any error: before everything, and in every quiet spell."""
 
-    finder: RangeFinder
     images: tuple[RangeImage, ...]
     times_s: tuple[float, ...]
     """Simulated time of each firing."""
@@ -39,7 +38,6 @@ class DemonstrationCamera:
             rng: The noise of the TV camera.
         """
         self.camera = TvCamera()
-        self.finder = RangeFinder()
         self.period_s = self.camera.period_s
         self._sight = Sight(world)
         self._rgba = np.array(world.model.geom_rgba, dtype=np.float64)
@@ -63,7 +61,7 @@ class DemonstrationCamera:
     def watched(self) -> DemonstrationImages:
         """What was kept, when the demonstration is over."""
         self._keep(np.inf)
-        return DemonstrationImages(self.finder, tuple(self._images), tuple(self._times), tuple(self._pictures))
+        return DemonstrationImages(tuple(self._images), tuple(self._times), tuple(self._pictures))
 
     def _picture(self, qpos: Array) -> Array:
         """The next picture of the TV camera; where nothing moved only its noise is new."""
@@ -85,5 +83,5 @@ class DemonstrationCamera:
 
     def _fire(self, time_s: float, qpos: Array) -> None:
         self._pictures.append(self._grey(qpos).reshape(self.camera.view.height, self.camera.view.width))
-        self._images.append(self._sight.range_image(self.finder))
+        self._images.append(self._sight.range_image())
         self._times.append(time_s)

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import Observation, Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.perception.depth_camera.range_finder import RangeFinder
+from apo_bench.perception.depth_camera.range_finder import VIEWS
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.sensor.rays import ModelRays, Sight
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, range_sensor, simulate_demonstration
@@ -57,15 +57,14 @@ def test_a_scene_and_the_models_of_its_parts_look_the_same_and_no_hands_are_seen
     built = scene("stick_in_tower")
     start = watched("stick_in_tower").layout.start
     hands = Hands(built, start)
-    finder = RangeFinder()
     hands.grab(0, "stick")  # the ball that holds it is thicker than the stick
     sight = Sight(built.shown)
     sight.look(hands.data.qpos)
-    image = sight.range_image(finder)
+    image = sight.range_image()
     solids = built.scenario.assembly.solids
     models = ModelRays(solids, 1e-3 * built.clearance_mm)
     poses = {part: start[part] for part in solids}
-    for view, distance in zip(finder.views, image.distance, strict=True):
+    for view, distance in zip(VIEWS, image.distance, strict=True):
         expected = models(poses, view.origin, view.rays)[0].reshape(distance.shape)
         both = np.isfinite(expected)
         assert (np.isfinite(distance) == both).mean() > 0.9999

@@ -12,7 +12,7 @@ from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, find_symmetries, pose
 from apo_bench.perception.depth_camera.fit import Points, covariance, refine_fit
 from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
-from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
+from apo_bench.perception.depth_camera.range_finder import VIEWS, PinholeView, RangeImage, sense
 from apo_bench.perception.depth_camera.starts import guess_poses
 from apo_bench.perception.depth_camera.surface import join_surfaces, sample_surface
 from apo_bench.simulation.sensor.rays import ModelRays
@@ -34,7 +34,7 @@ def range_of(poses: Mapping[str, Array], view: PinholeView) -> Array:
 def points_on(name: str, T: Array) -> Points:
     """What the views of the range finder see of a part at T, without any error."""
     each = []
-    for v, view in enumerate(RangeFinder().views):
+    for v, view in enumerate(VIEWS):
         distance, _ = MODELS({name: T}, view.origin, view.rays)
         hit = np.isfinite(distance)
         at = view.origin + distance[hit, None] * view.rays[hit]
@@ -89,14 +89,13 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
     operations = [Operation("castle")] * (1 + moved_twice) + [Operation("block")]
     assembly = Assembly({name: SOLIDS[name] for name in start}, tuple(operations), frozenset())
     after = [start, start | {"castle": halfway}, start | {"castle": goal}, {"castle": goal, "block": last}]
-    finder = RangeFinder()
     rng = np.random.default_rng(0)
     images = []
     for poses in after:
-        true = np.stack([range_of(poses, view) for view in finder.views])
-        images.append(finder.sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
+        true = np.stack([range_of(poses, view) for view in VIEWS])
+        images.append(sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
     turns = np.array([T[:3, :3] for T in [halfway] * moved_twice + [goal, last]])
-    events = follow_demonstration(images, finder, 0.5e-3, Expected(assembly, start, turns), MODELS)
+    events = follow_demonstration(images, 0.5e-3, Expected(assembly, start, turns), MODELS)
     assert [event.operation for event in events] == [int(moved_twice), 1 + moved_twice]
     for event, T in zip(events, (goal, last), strict=True):
         assert event.found is not None
