@@ -1,4 +1,4 @@
-"""Success rates of methods in one call: `evaluate`."""
+"""Success rates of methods: `evaluate`."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path

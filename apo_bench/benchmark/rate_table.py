@@ -1,4 +1,4 @@
-"""The table that `evaluate` returns: success rates with intervals, and the records they are counted from."""
+"""The table that `evaluate` returns."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""The command line, one file per command; where everything meets."""
+"""The command line: one file for each command."""

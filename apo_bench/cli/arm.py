@@ -1,4 +1,4 @@
-"""The commands `apo-bench arm list | check`: robot arms, and what each can do at the table."""
+"""The commands `apo-bench arm`: list robot arms, and check one at the table."""
 
 from pathlib import Path
 from typing import Annotated

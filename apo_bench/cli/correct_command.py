@@ -1,4 +1,4 @@
-"""The command `apo-bench correct`: observed poses, corrected by their face contacts; it needs no simulator."""
+"""The command `apo-bench correct`: correct observed poses without a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Any

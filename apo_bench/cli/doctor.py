@@ -1,4 +1,4 @@
-"""The command `apo-bench doctor`: what is installed, and whether pictures can be drawn."""
+"""The command `apo-bench doctor`: check packages, extras and rendering."""
 
 import platform
 import re

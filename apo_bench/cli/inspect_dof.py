@@ -1,4 +1,4 @@
-"""The command `apo-bench inspect dof`: what contacts fix; only its picture needs a simulator."""
+"""The command `apo-bench inspect dof`: degrees of freedom that contacts fix or leave free."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""The command `apo-bench inspect graph`: the relation graph of a scenario; it needs no simulator."""
+"""The command `apo-bench inspect graph`: the relation graph of a scenario."""
 
 from pathlib import Path
 from typing import Annotated

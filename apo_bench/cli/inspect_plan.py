@@ -1,4 +1,4 @@
-"""The command `apo-bench inspect plan`: how the robot does each operation; only its arm needs a simulator."""
+"""The command `apo-bench inspect plan`: motions, grasps and guards of each operation."""
 
 from pathlib import Path
 from typing import Annotated, Any

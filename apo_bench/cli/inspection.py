@@ -1,4 +1,4 @@
-"""The group of commands `apo-bench inspect`: one plan, looked into."""
+"""The command group `apo-bench inspect`."""
 
 from collections.abc import Callable, Mapping
 

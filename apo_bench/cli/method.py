@@ -1,4 +1,4 @@
-"""The command `apo-bench method list`: what makes the plan of the robot."""
+"""The command `apo-bench method list`."""
 
 import typer
 

@@ -1,4 +1,4 @@
-"""The commands `apo-bench part`: a CAD file becomes part files, and a scenario becomes parts to print."""
+"""The commands `apo-bench part`: import parts from CAD files, and export parts to print."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

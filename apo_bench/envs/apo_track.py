@@ -1,4 +1,4 @@
-"""The environment `APOTrack-v0`: tracking (Section 4.2 of the paper) as a decision process."""
+"""The environment `APOTrack-v0`: operation by operation (Section 4.2 of the paper)."""
 
 from typing import Any, final
 

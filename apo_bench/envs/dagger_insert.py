@@ -1,4 +1,4 @@
-"""`dagger-insert`: a small network that learned from the teacher `expert` where to go, by what is felt and seen."""
+"""The policy `dagger-insert`: a small network that imitates the teacher `expert`."""
 
 from collections import deque
 from functools import cache

@@ -1,4 +1,4 @@
-"""One episode of an environment: its settings, its scene, its observation, and what `info` says at its end."""
+"""One episode of an environment: settings, observation and final `info`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace

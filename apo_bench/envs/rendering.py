@@ -1,4 +1,4 @@
-"""What an environment shows of an episode: its start, its end, its replay as pictures, or a window."""
+"""Pictures and windows of an episode."""
 
 from typing import Any, final
 

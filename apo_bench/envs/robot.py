@@ -1,4 +1,4 @@
-"""The robot of an environment: its errors, whether it probes, and one replay by it."""
+"""The robot of an environment: its errors, its probing, and its replay."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a learner sees and does: the spaces of `APOReplay-v0`, and observations and plans in their terms.
+"""Observation and action space of `APOReplay-v0`.
 
 What a learner sees of one operation, and the space that it is in: `docs/guide/insertion.md` has every number.
 """

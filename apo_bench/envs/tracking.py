@@ -1,4 +1,4 @@
-"""Policies of `APOTrack-v0`: the acts of a robot after one more operation was shown (Section 4.2 of the paper)."""
+"""Policies of `APOTrack-v0` (Section 4.2 of the paper)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

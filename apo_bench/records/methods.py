@@ -1,4 +1,4 @@
-"""Names of methods: a corrector, or a plan without one, and what the robot does."""
+"""Names of methods."""
 
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -41,8 +41,8 @@ _PROBE = "+probe"
 class Method(NamedTuple):
     """A parsed method."""
 
-    corrector: str
-    """What makes the plan: `oracle`, `uncorrected`, `nominal`, or a corrector."""
+    corrector: Any
+    """What makes the plan: `oracle`, `uncorrected`, `nominal`, or a corrector, by name or itself."""
     spiral: bool = False
     """Whether the robot searches for holes in a spiral; one that probes does so as a last resort."""
     probe: bool = False

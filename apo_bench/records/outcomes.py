@@ -1,4 +1,4 @@
-"""The closed list of stages and codes: every way a trial can end, with its sentence.
+"""Stages and codes of endings, each with its sentence.
 
 A physical failure is a result, not an exception. `{part}` and `{operation}` (counted from 1) are filled in where the
 outcome is made; no other words appear in a record.

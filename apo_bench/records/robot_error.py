@@ -1,4 +1,4 @@
-"""Errors of the robot itself, by the names that records use: kinds with their standard deviations.
+"""Names of robot errors: kinds with their standard deviations.
 
 `none`              no error
 `hand_eye:1/0.2`    of the robot's base in the camera's frame: mm per axis, degrees per axis

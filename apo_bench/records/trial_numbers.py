@@ -1,4 +1,4 @@
-"""Which trials are for evaluation and which are for training: every number is for one of the two."""
+"""Trial numbers for evaluation and for training."""
 
 FIRST_TRAINING_TRIAL = 1_000_000
 """Trials from here on are for training: `dataset make` and the pool of `APOInsert-v0` begin here. Smaller numbers are

@@ -1,5 +1,6 @@
 """The configuration of a trial from keywords."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,18 @@ def configure_trial(scenario: str | Path | Scenario, **settings: Any) -> tuple[T
         require_known("setting", name, (*SETTINGS, NOISE_LEVEL.name))
     loaded = load_scenario(scenario)
     named = scenario.name if isinstance(scenario, Scenario) else str(scenario)
-    values: dict[str, Any] = {"scenario": named, "clearance_mm": loaded.clearance_mm}
-    if NOISE_LEVEL.name in settings:
-        level = parse_noise_level(settings.pop(NOISE_LEVEL.name), settings.get("pose_source", NOISE_MODEL))
-        values |= zip(("noise_mm", "noise_deg"), level, strict=True)
-    return TrialConfig(**(values | settings)), loaded
+    usual: dict[str, Any] = {"scenario": named, "clearance_mm": loaded.clearance_mm}
+    return TrialConfig(**(usual | expand_noise_level(settings))), loaded
+
+
+def expand_noise_level(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with `noise_mm` and `noise_deg` in place of a `noise_level`, unless one of the two is stated.
+
+    Raises:
+        InputError: The level is not allowed.
+    """
+    rest = dict(settings)
+    if NOISE_LEVEL.name not in rest:
+        return rest
+    level = parse_noise_level(rest.pop(NOISE_LEVEL.name), rest.get("pose_source", NOISE_MODEL))
+    return dict(zip(("noise_mm", "noise_deg"), level, strict=True)) | rest

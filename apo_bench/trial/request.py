@@ -28,6 +28,7 @@ from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.endings import record_lost_trial
 from apo_bench.trial.fingerprint import config_hash, content_hash
+from apo_bench.trial.keywords import expand_noise_level
 from apo_bench.trial.rollout import Rollout, trial_story
 from apo_bench.trial.run import MEASURED, noise_of, record_trial, run_measured
 from apo_bench.trial.stages import (
@@ -81,11 +82,9 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialConfig:
             "--noise-level is the noise of its rays in mm.",
         )
     usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
-    if "noise_level" in options:
-        usual |= dict.fromkeys(("noise_mm", "noise_deg"), options.pop("noise_level"))
     if "secret_seed_file" in options:
         options["secret_seed_file"] = read_secret_seed(options["secret_seed_file"])
-    return TrialConfig(**(usual | convert_to_python_units(options)))
+    return TrialConfig(**(usual | convert_to_python_units(expand_noise_level(options))))
 
 
 def _refuse_drawing(request: Request, options: Mapping[str, Any]) -> None:

@@ -24,6 +24,7 @@ from apo_bench.records import (
     DEPTH_CAMERA,
     DETECTED,
     USUAL_FT_SENSOR,
+    Method,
     TrialConfig,
     TrialRecord,
     knows_truth,
@@ -77,8 +78,8 @@ class RunContext:
 
     scene: Scene
     config: TrialConfig
-    corrector: Any
-    """The part of the method that makes the plan: a name or the corrector itself."""
+    method: Method
+    """The parsed method; its corrector may also be the corrector itself."""
     callbacks: Callbacks | None = None
     cache: ReplayCache | None = None
     """What replays of one scene and seed have in common; it changes nothing but the time they take."""
@@ -148,8 +149,9 @@ def run_trial(
     reobserve = reobservations_of(
         simulated, model, config.seed, config.max_reobservations, config.secret_seed, given.assembly
     )
-    corrector = method if callable(method) else parse_method(config.method).corrector
-    context = RunContext(scene, config, corrector, watch, cache)
+    parsed = parse_method(config.method)
+    parsed = parsed._replace(corrector=method) if callable(method) else parsed
+    context = RunContext(scene, config, parsed, watch, cache)
     return record | _plan_and_replay(context, observation, given, truth, reobserve)
 
 
@@ -175,7 +177,7 @@ def run_measured(
     content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
     record = start_record(settings, scene.scenario, config_hash(settings, content, text))
     record |= MEASURED | {"demonstration": "ok"}
-    context = RunContext(scene, settings, parse_method(settings.method).corrector, watch)
+    context = RunContext(scene, settings, parse_method(settings.method), watch)
     return record | _plan_and_replay(context, observation, _choose_contacts(settings, observation, None), None, None)
 
 
@@ -194,12 +196,12 @@ def _plan_and_replay(
         truth: (n, 4, 4) poses of the layout, world frame, [m]; None if they are not known.
     """
     config = context.config
-    planned = apply_method(context.corrector, given, truth, reobserve, context.scene)
+    corrector, spiral, probe = context.method
+    planned = apply_method(corrector, given, truth, reobserve, context.scene)
     if planned.plan is None:
         assert planned.failure is not None
         record = end_record(planned.failure, success=False)
     else:
-        _, spiral, probe = parse_method(config.method)
         predicted_success = predict_success(
             planned.plan, given, planned.correction, context.scene, config.robot_error, spiral, probe
         )
@@ -223,7 +225,7 @@ def _replay(context: RunContext, plan: Plan, observation: Observation, truth: Ar
     config = context.config
     scene = context.scene
     reference = move_nominal_poses(scene.scenario.nominal_poses, observation) if truth is None else truth
-    _, spiral, probe = parse_method(config.method)
+    _, spiral, probe = context.method
     error = draw_robot_error(config.robot_error, scene, config.seed, config.secret_seed)
     probing = None
     if probe:

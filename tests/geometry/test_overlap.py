@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Array, Face, pose
-from apo_bench.geometry.covering import compute_overlap
+from apo_bench.geometry.covering import FacePair, compute_overlap, compute_overlaps, compute_shares
 
 pytestmark = pytest.mark.numeric
 
@@ -81,3 +81,18 @@ def test_the_area_is_that_of_counted_points(T_face: Array):
     in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
     counted = step**2 * np.count_nonzero(in_ring & in_u)
     assert compute_overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)
+
+
+@given(st.lists(st.tuples(flat_poses, poses), min_size=1, max_size=6))
+@settings(max_examples=20, deadline=None)
+def test_many_pairs_in_one_call_are_as_each_alone(placed: list[tuple[Array, Array]]):
+    faces = [U_SHAPE, ring(0.04, 0.012), rectangle(0.03, 0.02)]
+    pairs = [FacePair(faces[i % 3], T_on @ T @ OVER, faces[i // 3], T_on) for i, (T, T_on) in enumerate(placed)]
+    pairs.append(FacePair(U_SHAPE, pose.at((0, 0, 0), (90, 0, 0)), U_SHAPE, EYE))
+    together = compute_overlaps(pairs)
+    for pair, found in zip(pairs, together, strict=True):
+        alone = compute_overlap(*pair)
+        assert found.area == pytest.approx(alone.area, abs=1e-15)
+        np.testing.assert_allclose(found.corners, alone.corners, rtol=0, atol=1e-9)
+    assert compute_overlaps([]) == []
+    assert compute_shares(together, together).tolist() == pytest.approx([1.0] * len(pairs))

@@ -12,13 +12,14 @@ from apo_bench import Scene, TrialConfig, build_scene, load_scenario, run_trial
 from apo_bench.assembly import Hypothesis
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
+from apo_bench.planning.prediction.measures import drawn_measures
 from apo_bench.records import TrialRecord
 from apo_bench.simulation.execution import ExecutionConfig
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial import run
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.predicted_success import predict_success
-from apo_bench.trial.robot_draws import brought
+from apo_bench.trial.robot_draws import brought, stack_errors
 from apo_bench.trial.run import noise_of
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
@@ -106,6 +107,29 @@ def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
         others = [part for part in state if part not in operation.moves]
         off = [np.linalg.norm(before.poses[part][:2, 3] - state[part][:2, 3]) for part in others]
         assert max(off) < 0.15e-3
+
+
+def test_several_robots_at_once_bring_parts_where_each_does(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    plan = correct(seen, "contact").plan(seen)
+    drawn = [draw_robot_error("hand_eye:0.5/0.2+joints:0.02+in_hand:0.3/0.2", scene, seed) for seed in range(3)]
+    errors = [error for error in drawn if error is not None]
+    together = brought(plan, scene, stack_errors(errors))
+    limits = scene.scenario.thresholds
+    sizes = {
+        (each.operation, each.kind): each.size
+        for each in drawn_measures(plan, scene.clearance_mm, limits, scene.scenario.attach, (), together)
+    }
+    for i, error in enumerate(errors):
+        alone = brought(plan, scene, error)
+        for every, each in zip(together, alone, strict=True):
+            for part, T in each.items():
+                at = every[part][i] if every[part].ndim == 3 else every[part]
+                np.testing.assert_allclose(at, T, rtol=0, atol=1e-12)
+        for one in drawn_measures(plan, scene.clearance_mm, limits, scene.scenario.attach, (), alone):
+            assert one.size.shape == (1,)
+            if one.kind in ("fit", "side"):
+                assert sizes[one.operation, one.kind][i] == pytest.approx(one.size[0], abs=1e-9)
 
 
 def test_the_likelier_a_rival_whose_contacts_the_plan_breaks_the_less_it_promises(

@@ -10,7 +10,7 @@ import pytest
 from apo_bench import TrialConfig
 from apo_bench.assembly import Observation
 from apo_bench.geometry import Array
-from apo_bench.records import WITHOUT_CORRECTOR
+from apo_bench.records import WITHOUT_CORRECTOR, parse_method
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial import run
 from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
@@ -45,7 +45,7 @@ def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation
     assert len(told.assembly.relations()) == len(seen.assembly.relations()) - 1
     said: list[dict[str, Any]] = []
     for right in (seen, missed):
-        context = run.RunContext(scene, MISSED, MISSED.method)
+        context = run.RunContext(scene, MISSED, parse_method(MISSED.method))
         row: Any = run._plan_and_replay(context, right, told, truth, None)
         said.append({name: row[name] for name in SAID})
     assert said[0] == said[1]

@@ -1,4 +1,4 @@
-"""Conditions: what trials share that differ in nothing but the seed."""
+"""Conditions: groups of trials that differ only in their seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, make_dataclass, replace

@@ -1,4 +1,4 @@
-"""Effort of replays: operations beyond doing each once, simulated time, how far finished parts were pushed."""
+"""Effort of replays: extra steps, simulated time, and displacement of placed parts."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The largest gap of the contacts, observed and planned: percentiles over the trials of a condition."""
+"""Percentiles of the largest contact gap, at observed and at planned poses."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Success rates with Wilson's intervals: one cell for trials that differ in nothing but the seed."""
+"""Success rates of conditions with Wilson's intervals."""
 
 import math
 from collections import Counter
@@ -18,8 +18,8 @@ CONFIDENCE = 0.95
 Records = Trials | Iterable[Mapping[str, Any]]
 """Trials as columns, or as records."""
 NOT_EXECUTED = ("observe", "correct", "predicted-success", "plan", "worker")
-"""Stages of failures at which no plan was carried out to its end: there was none, it promised too little, it was
-refused before anything moved, or its process died."""
+"""Stages of failures without an executed plan: there is none, its predicted success is too low, the planner rejects it,
+or its process died."""
 
 
 class Interval(NamedTuple):

@@ -1,4 +1,4 @@
-"""Settings: what the methods and noise levels of one table or panel have in common."""
+"""Settings that the methods and noise levels of one table or panel share."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar

@@ -1,4 +1,4 @@
-"""The card of a data set, `README.md`, and what it describes: fields, episodes, metadata."""
+"""The card of a data set: `README.md` with fields, episodes and metadata."""
 
 import math
 from collections.abc import Mapping

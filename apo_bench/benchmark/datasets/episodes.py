@@ -1,4 +1,4 @@
-"""Whole trials as data: what was seen, planned and true, and every replay, frame by frame."""
+"""Trials as episodes of a data set: observations, plans, true poses and frames."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

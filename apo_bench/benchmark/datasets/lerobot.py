@@ -1,4 +1,4 @@
-"""Episodes as a LeRobot data set v3.0: Parquet and JSON, written without LeRobot.
+"""Write episodes as a LeRobot data set v3.0.
 
 The format is that of `huggingface/lerobot`, `src/lerobot/datasets`: frames of all episodes one after the other in
 `data`, one row group an episode; what is known of each episode, with its statistics, in `meta/episodes`; tasks by their

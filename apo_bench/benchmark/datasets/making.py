@@ -1,4 +1,4 @@
-"""What `apo-bench dataset make` makes: trials, in one of three formats.
+"""Make a data set of trials in one of three formats.
 
 Insertions as data: what a policy saw and did in `APOInsert-v0`, and what the judge said.
 """

@@ -1,4 +1,4 @@
-"""Episodes as a Minari data set: HDF5 and JSON, written without Minari.
+"""Write episodes as a Minari data set.
 
 The format is that of `Farama-Foundation/Minari`, `minari/dataset/_storages/hdf5_storage.py`: a group for each episode,
 with what was seen before the first action and after each; beside it the spaces and what is known of all.

@@ -1,1 +1,1 @@
-"""What a sweep says, as a page, tables and figures: rows in, files out."""
+"""The report of a sweep: page, tables and figures."""

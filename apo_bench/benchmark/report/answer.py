@@ -1,4 +1,4 @@
-"""The answer of a sweep in some sentences: the counts first, then what follows from them.
+"""The sentences at the top of a report: counts, then conclusions.
 
 No sentence states more than its counts: an interval only with enough seeds, "more often" only if the difference is
 beyond chance, "as often" only if the interval lies close around 0.

@@ -1,4 +1,4 @@
-"""Which failures a report shows as pictures; others can draw them."""
+"""The failures that a report draws."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Write the report of a sweep: one page that answers, with tables and figures next to it."""
+"""Write the report of a sweep."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path

@@ -56,9 +56,9 @@ class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     executed: Count
     """Those whose plan was carried out."""
     predicted_success: Share | None
-    """Mean of what plans promised; None where none did."""
+    """Mean predicted success of the plans; None without predictions."""
     brier: Share | None
-    """Mean squared difference of promise and success, of plans that were carried out."""
+    """Mean squared difference of predicted success and success, of executed plans."""
     rows: Hash
     """Over the rows, in any order."""
     code: Hash

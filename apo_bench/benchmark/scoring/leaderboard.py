@@ -1,4 +1,4 @@
-"""A table of entries: scores with intervals, one figure of all tracks, hashes of what was run."""
+"""The leaderboard: a table of entries with scores and intervals."""
 
 import warnings
 from collections import Counter

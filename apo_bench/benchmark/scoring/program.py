@@ -1,4 +1,4 @@
-"""A program in any language as a corrector: each trial starts it, it reads one line of JSON and writes one.
+"""A program in any language as a corrector, by one line of JSON in and out.
 
 A request, `apo-bench/request/1`, is all that a corrector may use: an observation as files have it, with `carries` and
 `contacts` (pairs of `part.face`) in each operation, `faces` (`part.face` -> a point and a direction in the frame of the

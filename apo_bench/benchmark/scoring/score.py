@@ -1,4 +1,4 @@
-"""Score a method: run the trials of tracks, resumed where they were left, and count."""
+"""Score a method over the trials of tracks."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""Tracks: scenarios, seeds and settings that are fixed, each in a file, so that all scores are of the same trials.
+"""Tracks: files with fixed scenarios, seeds and settings.
 
 A track is a sweep file without methods, and a table of its own:
 

@@ -1,4 +1,4 @@
-"""A Ray cluster whose nodes share the batches of a sweep; each node runs them as this machine would.
+"""A Ray cluster whose nodes share the batches of a sweep.
 
 Only the process that started the sweep writes records. A node that is lost has its batches run again elsewhere.
 """

@@ -1,4 +1,4 @@
-"""The grids of a sweep: which trials there are, and which of them share a demonstration."""
+"""The grids of a sweep: every combination of settings."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

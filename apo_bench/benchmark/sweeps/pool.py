@@ -1,4 +1,4 @@
-"""Local processes that share the batches of a sweep, or run one trial; one that dies or hangs costs one trial.
+"""Local processes that share the batches of a sweep.
 
 A batch whose process dies, or that takes longer than a trial may, runs again trial by trial: so the one that is to
 blame has the failed record.

@@ -1,4 +1,4 @@
-"""How far a sweep is: a bar with an estimate on a terminal, a line a minute anywhere else."""
+"""The progress of a sweep on the terminal."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""Stop at signals: a signal that asks a program to end raises an exception, as Ctrl-C does."""
+"""Signals that end a program raise an exception, as Ctrl-C does."""
 
 import signal
 import threading

@@ -1,4 +1,4 @@
-"""Run sweeps over processes or machines; the parent writes the records, and an interrupted sweep resumes."""
+"""Run sweeps, and resume interrupted ones."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

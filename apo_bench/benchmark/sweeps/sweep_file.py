@@ -1,4 +1,4 @@
-"""Sweep files: grids as TOML; every complaint names file, key and remedy.
+"""Sweep files: grids of settings as TOML.
 
     scenario = ["stick_in_tower", "carried_bridge"]
     noise_level = [0.5, 1, 2]

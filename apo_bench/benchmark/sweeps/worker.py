@@ -1,4 +1,4 @@
-"""A worker: it runs batches of trials, in any process on any machine."""
+"""Run batches of trials in a worker process."""
 
 import platform
 import time

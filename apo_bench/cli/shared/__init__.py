@@ -1,4 +1,4 @@
-"""What several commands share: options, help, checks of output files, printing."""
+"""Options, help pages, checks of output files and printing that commands share."""
 
 from apo_bench.cli.shared.arguments import (
     NO_RESULT,

@@ -1,4 +1,4 @@
-"""Names that a shell offers when Tab is pressed, from short lists and folders; no file is read.
+"""Completion of names when Tab is pressed in a shell.
 
 Where no name begins like the typed text, a shell offers files, as scenarios, noise models and arms may be files.
 """

@@ -1,4 +1,4 @@
-"""The layout of `--help`: commands and options in groups, and examples at the end of each page."""
+"""The layout of `--help`: groups of commands and options, then examples."""
 
 import signal
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""How commands print: JSON, names with texts, tables as wide as the terminal."""
+"""Printing of JSON, texts and tables."""
 
 import json
 import sys

@@ -1,1 +1,1 @@
-"""The folder of a sweep: its rows, `run.json`, and what is read off them."""
+"""The folder of a sweep."""

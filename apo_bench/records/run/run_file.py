@@ -1,4 +1,4 @@
-"""`run.json`: the settings of a sweep and what its records are made of; whether another sweep is the same."""
+"""`run.json`: the settings of a sweep and the inputs of its records."""
 
 import json
 import os

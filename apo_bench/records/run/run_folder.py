@@ -1,4 +1,4 @@
-"""The folder of a sweep: records that are only appended, each whole, and the settings of the sweep.
+"""The folder of a sweep, to which records are appended.
 
 trials.jsonl   one record per trial: only what settings and seed determine
 timing.jsonl   one line per trial: wall times, host, worker; missing lines do not matter

@@ -1,4 +1,4 @@
-"""Trial records as columns: numbers as arrays, everything else by the number of its value.
+"""Trial records as columns.
 
 A million records fit into memory so, and are grouped in seconds.
 """

@@ -1,4 +1,4 @@
-"""Read and check the lines and documents in the folder of a sweep; every error names file, line and field."""
+"""Read and check the files in the folder of a sweep."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType

@@ -1,1 +1,1 @@
-"""Two sweeps against each other: numbers, words, page."""
+"""The comparison of two sweeps."""

@@ -1,4 +1,4 @@
-"""Compare two sweeps trial by trial: two versions, two machines, two fidelities."""
+"""Compare two sweeps trial by trial."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Write a comparison: tables for the terminal and the page, the page itself, and one JSON object."""
+"""A comparison as tables, page and JSON object."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""Figures of a sweep: rows in, pictures out."""
+"""The figures of a sweep."""

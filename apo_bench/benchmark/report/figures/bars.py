@@ -1,4 +1,4 @@
-"""Bars of shares: how trials ended, and what was predicted and came of it."""
+"""Bar figures: endings of trials, and predictions against outcomes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

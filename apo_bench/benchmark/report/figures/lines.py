@@ -1,4 +1,4 @@
-"""Lines with bands: something of every method over levels, or over whatever else is tried at several values."""
+"""Line figures with bands: a value of every method over a setting."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""A figure: panels side by side below a legend, drawn once, as SVG and as PNG."""
+"""A figure of panels below one legend, as SVG and PNG."""
 
 import io
 import textwrap

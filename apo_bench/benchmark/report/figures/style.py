@@ -1,4 +1,4 @@
-"""How figures look: colours, markers and dashes, told apart without colour too."""
+"""Colours, markers and dashes of figures."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

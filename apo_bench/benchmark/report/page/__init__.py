@@ -1,1 +1,1 @@
-"""The pages: templates, their style and their script."""
+"""The HTML pages of reports."""

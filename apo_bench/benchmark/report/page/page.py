@@ -1,4 +1,4 @@
-"""A page out of one template: sections of tables, figures and sentences in one file.
+"""An HTML page of sections from one template.
 
 It has no address outside it, and a policy that lets a browser load none.
 """

@@ -1,4 +1,4 @@
-"""The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell."""
+"""The HTML page of a sweep."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

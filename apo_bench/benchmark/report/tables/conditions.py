@@ -1,4 +1,4 @@
-"""Tables of success: rates of conditions, pairs of methods over the same seeds, levels of half success."""
+"""Tables of success: rates of conditions, pairs of methods, and half levels."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
     """Axes that are as usual in every cell are left to files."""
     unusual = {name for name in _AXES if any(getattr(c, name) != getattr(TrialConfig, name) for c in cells)}
     min_predicted_success = "min_predicted_success" in unusual
-    promises = any(c.predicted_success is not None for c in cells)
+    has_prediction = any(c.predicted_success is not None for c in cells)
 
     def axis(name: str) -> TableColumn:
         return TableColumn(name, name * (name in unusual), text=f"{{words.{name}}}", words=True)
@@ -57,7 +57,7 @@ def condition_table(cells: Sequence[ConditionResult]) -> Table:
                 "wrong when executed" * min_predicted_success,
                 text="{wrong_when_executed:percent}",
             ),
-            TableColumn("predicted_success", "predicted success" * promises, text="{predicted_success:percent}"),
+            TableColumn("predicted_success", "predicted success" * has_prediction, text="{predicted_success:percent}"),
             TableColumn("brier"),
             TableColumn("as_demonstrated", value="demonstrated"),
             TableColumn("as_demonstrated_rate", "as demonstrated", "demonstrated_rate", "{demonstrated_rate:percent}"),

@@ -1,4 +1,4 @@
-"""One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns."""
+"""A table whose columns give HTML, text, Markdown, CSV and Parquet."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
