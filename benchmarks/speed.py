@@ -268,12 +268,9 @@ def draw(made: Sequence[dict[str, Any]], path: Path) -> None:
 def page(found: dict[str, Any]) -> Iterator[str]:
     """Yield the lines of the page."""
     made = found["trials"]
-    yield "# Speed"
-    yield ""
+    yield from ("# Speed", "")
     yield "Repeat it with `python -m benchmarks.speed`. Numbers depend on the machine: compare within a table only."
-    yield ""
-    yield "## Trial"
-    yield ""
+    yield from ("", "## Trial", "")
     yield f"Mean processor seconds of a trial of `{METHOD}` at 1 mm, 1 degree (1 sigma per axis), by stage."
     yield ""
     yield "![Stages of a trial](speed.svg)"
@@ -286,10 +283,8 @@ def page(found: dict[str, Any]) -> Iterator[str]:
             yield f"| {scenario} | {fidelity} | {mean(some):.2f} | {median(factors):.0f} |"
     yield ""
     yield "`near-contact` skips stretches far from contact; their simulated time counts."
-    yield ""
-    yield "## Control steps"
-    yield ""
-    yield "Steps a second of one core under random actions, without pictures."
+    yield from ("", "## Control steps", "")
+    yield "Steps a second of one core under random actions, without pictures; robosuite and gym-taskboard on MuJoCo 3.8.1."
     yield ""
     yield from ("| environment | steps a second | Hz | times real time |", "|---|--:|--:|--:|")
     for name, rate in found["steps"].items():
@@ -298,9 +293,7 @@ def page(found: dict[str, Any]) -> Iterator[str]:
     if missing := [name for name in TASKS if name not in found["steps"]]:
         yield ""
         yield f"Not measured, since they did not install or run: {', '.join(missing)}."
-    yield ""
-    yield "## Correctors"
-    yield ""
+    yield from ("", "## Correctors", "")
     yield from found["correctors"]
 
 
@@ -333,8 +326,12 @@ def main() -> None:
             found[name] = made
             RESULT.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if {"trials", "steps", "correctors"} <= found.keys():
+        import mujoco
+
+        from benchmarks.provenance import with_mujoco
+
         draw(found["trials"], PAGE.with_suffix(".svg"))
-        PAGE.write_text("\n".join(page(found)) + "\n", encoding="utf-8")
+        PAGE.write_text(with_mujoco("\n".join(page(found)), [mujoco.__version__]), encoding="utf-8")
 
 
 if __name__ == "__main__":
