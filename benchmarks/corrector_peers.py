@@ -15,8 +15,7 @@ import numpy as np
 
 from apo_bench import Observation
 from apo_bench.assembly import Equations, build_contact_equations
-from apo_bench.correction.baselines.least_squares import EVALUATIONS
-from apo_bench.correction.baselines.penalty import PENALTY_CONTACT_M
+from apo_bench.correction.baselines.least_squares import CONTACT_M, EVALUATIONS
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
@@ -46,7 +45,7 @@ def correct_by_gtsam(observation: Observation) -> Array:
     for c in contacts:
         one = system.among(contacts == c)
         if keys := list(one.variables(len(observation.poses))):
-            noise = gtsam.noiseModel.Isotropic.Sigma(len(one), PENALTY_CONTACT_M)
+            noise = gtsam.noiseModel.Isotropic.Sigma(len(one), CONTACT_M)
             graph.add(gtsam.CustomFactor(noise, keys, _error_of(one, observation.poses)))
     settings = gtsam.LevenbergMarquardtParams()
     settings.setLinearSolverType("MULTIFRONTAL_QR")
@@ -82,7 +81,7 @@ def correct_by_ceres(observation: Observation) -> Array:
     system = build_contact_equations(observation.assembly, observation.start, observation.poses)
 
     def slopes(z: Array) -> Array:
-        return space.pull_back(z, system.linearise(space.poses(z))[1]) / PENALTY_CONTACT_M
+        return space.pull_back(z, system.linearise(space.poses(z))[1]) / CONTACT_M
 
     class Cost(pyceres.CostFunction):  # type: ignore[misc, name-defined]
         def __init__(self, m: int, value: Callable[[Array], Array], slope: Callable[[Array], Array]) -> None:
@@ -104,7 +103,7 @@ def correct_by_ceres(observation: Observation) -> Array:
     z = [np.zeros(6) for _ in range(n)]
     asked = pyceres.Problem()
     costs = [
-        Cost(len(system), lambda z: system.residual(space.poses(z)) / PENALTY_CONTACT_M, slopes),
+        Cost(len(system), lambda z: system.residual(space.poses(z)) / CONTACT_M, slopes),
         Cost(6 * n, lambda z: z, lambda z: np.eye(6 * n)),
     ]
     for cost in costs:

@@ -284,7 +284,7 @@ def page(found: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield "`near-contact` skips stretches far from contact; their simulated time counts."
     yield from ("", "## Control steps", "")
-    yield "Steps a second of one core under random actions, without pictures; robosuite and gym-taskboard on MuJoCo 3.8.1."
+    yield "Steps a second of one core under random actions, without pictures; other packages on MuJoCo 3.8.1."
     yield ""
     yield from ("| environment | steps a second | Hz | times real time |", "|---|--:|--:|--:|")
     for name, rate in found["steps"].items():
