@@ -57,7 +57,13 @@ def measure_intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 
 def measure_intrusion_depths(
-    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
+    a: tuple[Piece, ...],
+    R_a: Array,
+    at: Array,
+    b: tuple[Piece, ...],
+    T_b: Array,
+    apart_m: float = np.inf,
+    measured_m: float = 0.0,
 ) -> Array:
     """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
 
@@ -65,12 +71,13 @@ def measure_intrusion_depths(
         R_a: (3, 3), the orientation of `a`.
         at: (k, 3), the places of the frame of `a`, [m].
         apart_m: What is farther apart than this may count as so far apart, which takes less time.
+        measured_m: Pieces of which the upright boxes are farther apart than this may count as apart by that of these.
 
     Returns:
         (k,), [m].
     """
     if not (all_boxes(a) and all_boxes(b)):
-        return _piece_by_piece(a, R_a, at, b, T_b, apart_m)
+        return _piece_by_piece(a, R_a, at, b, T_b, apart_m, measured_m)
     axes = box_axes(R_a, T_b[:3, :3])
     # Two boxes are as deep in each other as their shadows on the axis on which that is least; pieces as their deepest
     # pair.
@@ -112,7 +119,7 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
 
 
 def _piece_by_piece(
-    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
+    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float, measured_m: float
 ) -> Array:
     """`measure_intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by
     how far these are apart.
@@ -122,25 +129,32 @@ def _piece_by_piece(
     """
     pairs = _pairs(a, R_a, at, b, T_b, apart_m)
     if len(at) < 2 or len(at) * len(pairs) < _MOST_ROOMS:
-        return _measure(a, R_a, at, b, T_b, pairs, apart_m)
+        return _measure(a, R_a, at, b, T_b, pairs, apart_m, measured_m)
     halves = (at[: len(at) // 2], at[len(at) // 2 :])
-    return np.concatenate([_piece_by_piece(a, R_a, each, b, T_b, apart_m) for each in halves])
+    return np.concatenate([_piece_by_piece(a, R_a, each, b, T_b, apart_m, measured_m) for each in halves])
 
 
 def _measure(
-    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any, apart_m: float
+    a: tuple[Piece, ...],
+    R_a: Array,
+    at: Array,
+    b: tuple[Piece, ...],
+    T_b: Array,
+    pairs: Any,
+    apart_m: float,
+    measured_m: float,
 ) -> Array:
     """The depth of the deepest of some pairs, (p, 2), at k places, (k,)."""
     # Pairs that are surely apart count by their room; the others are measured, nearest first, and only at places where
     # they may be deeper than what was found there before: first across sides, which bounds the depth from above.
     rooms = _rooms(a, R_a, at, b, T_b, pairs)
-    deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=1, initial=-apart_m)
+    deepest = np.where(rooms > measured_m, -rooms, -np.inf).max(axis=1, initial=-apart_m)
     closest = rooms.min(axis=0, initial=np.inf)
-    order = np.flatnonzero(closest <= 0.0)
+    order = np.flatnonzero(closest <= measured_m)
     for k in order[np.argsort(closest[order], kind="stable")]:
         i, j = pairs[k]
         room = rooms[:, k]
-        near = (room <= 0.0) & (-room > deepest)
+        near = (room <= measured_m) & (-room > deepest)
         if not near.any():
             continue
         across = np.full(len(at), -np.inf)
@@ -275,7 +289,7 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
         if pairs is None:
             depths = measure_intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
         else:
-            depths = _measure(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0)
+            depths = _measure(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0, 0.0)
         met = np.flatnonzero(depths > TOUCH_M)
         if len(met):
             return begin + int(met[0])

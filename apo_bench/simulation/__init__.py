@@ -1,4 +1,4 @@
-"""The only room that knows MuJoCo and mink: scenes, hands, the arm, replay, pictures.
+"""Scenes, hands, the arm, replays and pictures, by MuJoCo and mink.
 
 How a plan is carried out, to be read in this order: `execution/controller.py` (`replay`, one step of the schedule after
 the other), `execution/prepare.py` (a step becomes a `Transfer`: grips, lines, guards), `execution/carry_out.py` (one

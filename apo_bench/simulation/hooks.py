@@ -1,4 +1,4 @@
-"""Hooks: functions that a demonstration or a replay calls; they change nothing."""
+"""Hooks that a demonstration or a replay calls."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

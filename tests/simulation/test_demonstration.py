@@ -83,7 +83,7 @@ def test_a_careless_human_errs_in_the_stated_operation_and_succeeds(name: str, h
 def test_skipped_stretches_and_sleep_change_poses_by_micrometres(monkeypatch: pytest.MonkeyPatch):
     """Two operations carry parts that touch, and the stick falls from a hand in which it hung still."""
     quick = shown("pocket_table", 1.0, 2).demonstration
-    monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
+    monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n, begun: [(begun, n)])
     monkeypatch.setattr(demonstration, "allow_sleep", lambda world, allowed: nullcontext())
     whole = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     pairs = [*zip(whole.poses, quick.poses, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]

@@ -1,4 +1,4 @@
-"""Check what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
+"""Check what an arm can do at the table."""
 
 from dataclasses import dataclass
 from typing import final

@@ -1,16 +1,14 @@
-"""Predict what an arm makes of a plan: reach, room to the limits of joints, room of the gripper, tip error."""
+"""Predict what an arm makes of a plan."""
 
 from collections.abc import Iterable, Sequence
 from typing import Literal, cast
 
-import mujoco
 import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, measure_intrusion_depths, pose
 from apo_bench.planning.prediction.measures import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
-from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,
     OPEN_TO_RELEASE_M,
@@ -115,23 +113,14 @@ def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:
 
 def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     """Where a weight takes the tip, and what it holds: servos give way by their torque over their stiffness."""
-    tip = scene.kinematics.forward(q)[:3, 3]
+    T = scene.kinematics.forward(q)
+    J = scene.kinematics.jacobian(q)
     # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
-    # a twist of the tip, which turns about the tip: there exp(twist) back.
-    J = _jacobian(scene.kinematics)
+    # a twist of the tip, in its own frame: T exp(twist) T^-1 in the world.
     stiffness = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
-    wrench = np.concatenate([force, np.cross(centroid - tip, force)])
-    twist = J @ ((J.T @ wrench) / stiffness)
-    return np.asarray(pose.at(tip) @ pose.exp(twist) @ pose.at(-tip))
-
-
-def _jacobian(kinematics: Kinematics) -> Array:
-    """Of the tip, (6, joints): how it moves [m] and turns [rad] with each joint [rad], world, where the arm now is."""
-    model = kinematics.model
-    J = np.zeros((6, model.nv))
-    mujoco.mj_jacSite(model, kinematics.configuration.data, J[:3], J[3:], kinematics.site)
-    return J[:, model.jnt_dofadr[kinematics.ids]]
+    wrench = np.concatenate([force @ T[:3, :3], np.cross(centroid - T[:3, 3], force) @ T[:3, :3]])
+    return np.asarray(T @ pose.exp(J @ ((J.T @ wrench) / stiffness)) @ pose.inverse(T))
 
 
 def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], slowly: bool) -> float:

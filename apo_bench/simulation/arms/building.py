@@ -1,4 +1,4 @@
-"""Build an `Arm` from its description: put its model together, drive its joints, mount its gripper."""
+"""Build an `Arm` from its description."""
 
 from collections.abc import Sequence
 from dataclasses import replace

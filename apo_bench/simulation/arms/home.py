@@ -1,4 +1,4 @@
-"""Find the joint angles at which an arm waits: of the ways to hold the tip over the table the one with most room."""
+"""Find the joint angles at which an arm waits over the table with most room."""
 
 from dataclasses import replace
 from itertools import product

@@ -38,6 +38,10 @@ class Kinematics:
         self._leans = len(arm.joints) < 6
         turning = self.LEANING if self._leans else 0.3
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=turning)
+        self._cost: Array = self._task.cost[:, None]
+        self._damping: Array = self.DAMPING * np.eye(self.model.nv)
+        self._J: Array = np.zeros((2, 3, self.model.nv))
+        self._turned: Array = np.zeros(4)
         self._limits = [mink.ConfigurationLimit(self.model)]
         self._full = self.model.qpos0.copy()
         limited = self.model.jnt_limited.astype(np.bool_)
@@ -80,57 +84,85 @@ class Kinematics:
 
     def forward(self, q: Array) -> Array:
         """The pose of the tip, (4, 4), world."""
+        data = self.configuration.data
         self._full[self.adr] = q
-        self.configuration.update(self._full)
-        return frame(self.configuration.data.site_xmat[self.site], self.configuration.data.site_xpos[self.site])
+        data.qpos[:] = self._full
+        mujoco.mj_kinematics(self.model, data)
+        return frame(data.site_xmat[self.site], data.site_xpos[self.site])
 
     def jacobian(self, q: Array) -> Array:
         """The body Jacobian of the tip, (6, joints): its twist in its own frame, [m, rad], per radian of each joint."""
-        self._full[self.adr] = q
-        self.configuration.update(self._full)
-        whole = self.configuration.get_frame_jacobian(str(self.model.site(self.site).name), "site")
-        return np.asarray(whole[:, self.model.jnt_dofadr[self.ids]])
+        self.forward(q)
+        return self._jacobian()[:, self.model.jnt_dofadr[self.ids]]
+
+    def inverse_jacobian(self, q: Array) -> Array:
+        """How the joints turn with the tip, (joints, 6), [rad] per [m, rad] of a twist in its own frame.
+
+        An arm of five joints keeps the place of the tip before its turn, as `inverse` does.
+        """
+        return np.asarray(np.linalg.pinv(self._cost * self.jacobian(q)) * self._cost[:, 0])
+
+    def _jacobian(self) -> Array:
+        """The body Jacobian of the tip where `mj_kinematics` found it, (6, all joints of the model)."""
+        data = self.configuration.data
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_jacSite(self.model, data, self._J[0], self._J[1], self.site)
+        return np.asarray((data.site_xmat[self.site].reshape(3, 3).T @ self._J).reshape(6, -1))
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
         """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there.
 
         The turn about one axis is left to an arm of five joints, within `LEAN_RAD`.
         """
-        self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))
+        data = self.configuration.data
+        target = quaternion(T)
         self._full[self.adr] = near
-        self.configuration.update(self._full)
+        data.qpos[:] = self._full
         for _ in range(turns):
-            error: Any = self._task.compute_error(self.configuration)
+            mujoco.mj_kinematics(self.model, data)
+            error = self._error(T[:3, 3], target)
             off = error.tolist()
             if all(abs(x) < self.POSITION_M for x in off[:3]) and all(abs(x) < self.ANGLE_RAD for x in off[3:]):
                 return self.last
-            step = self._step()
+            step = self._step(error, T)
             if step is None:
                 return None
-            if self._leans and max(map(abs, off[:3])) < self.POSITION_M and np.abs(step).max() < self.ANGLE_RAD:
+            longest = float(np.abs(step).max())
+            if self._leans and max(map(abs, off[:3])) < self.POSITION_M and longest < self.ANGLE_RAD:
                 return self.last if max(map(abs, off[3:])) < self.LEAN_RAD else None
             # No joint turns by more than half a radian in one step: far from the target the linearisation is wrong.
-            longest = float(np.abs(step).max())
-            self.configuration.integrate_inplace(step * min(1.0, 0.5 / max(longest, 1e-12)), 1.0)
+            mujoco.mj_integratePos(self.model, data.qpos, step, min(1.0, 0.5 / max(longest, 1e-12)))
         return None
 
-    def _step(self) -> Array | None:
-        """The step of all joints that mink's quadratic programme finds; None if it finds none.
+    def _error(self, position: Array, turned: Array) -> Array:
+        """How far the tip is from a place, (3,), and from a quaternion: (6,), in its own frame, [m] and [rad]."""
+        data = self.configuration.data
+        error = np.empty(6)
+        error[:3] = (position - data.site_xpos[self.site]) @ data.site_xmat[self.site].reshape(3, 3)
+        mujoco.mju_mat2Quat(self._turned, data.site_xmat[self.site])
+        mujoco.mju_subQuat(error[3:], turned, self._turned)
+        return error
 
-        Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
+    def _step(self, error: Array, T: Array) -> Array | None:
+        """The step of all joints towards T; None if there is none.
+
+        mink's quadratic programme without limits is a linear system. Where its solution keeps them, it is that of the
+        programme too.
         """
-        # The least of 1/2 s^T H s + c^T s with H = J^T W J and c = -J^T W error: without limits H s = -c. A little
+        # The least of 1/2 s^T H s - c^T s with H = J^T W J and c = J^T W error: without limits H s = c. A little
         # damping on the diagonal keeps H regular where the arm is straight.
-        H, c = self._task.compute_qp_objective(self.configuration)
+        J = self._cost * self._jacobian()
+        H = J.T @ J + self._damping
+        c = (self._cost[:, 0] * error) @ J
         if self._posture is not None:
             more = self._posture.compute_qp_objective(self.configuration)
             H = H + more[0]
-            c = c + more[1]
-        np.einsum("ii->i", H)[:] += self.DAMPING
-        step: Array = np.linalg.solve(H, -c)
-        low, high = self.GAIN * (self._range - self.configuration.q)
+            c = c - more[1]
+        step: Any = np.linalg.solve(H, c)
+        low, high = self.GAIN * (self._range - self.configuration.data.qpos)
         if (step >= low).all() and (step <= high).all():
             return step
+        self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))
         try:
             tasks = [self._task] if self._posture is None else [self._task, self._posture]
             limited = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", damping=self.DAMPING, limits=self._limits)

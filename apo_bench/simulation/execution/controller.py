@@ -1,4 +1,7 @@
-"""The robot replays a plan: open loop in the poses, closed loop only in force; the same controller for every method."""
+"""The robot replays a plan, open loop in the poses and closed loop in force.
+
+Every method has the same controller.
+"""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""One execution of a schedule: the robot, what it has reached, and its estimate of its own errors."""
+"""Execute a schedule of moves by one robot."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,4 +1,6 @@
-"""Search for a hole where force stops an insertion: spirals under a light push at several yaws, then giving way.
+"""Search for a hole where force stops an insertion.
+
+Spirals follow under a light push at several yaws; then the part goes on, giving way across.
 
 The robot knows what it commands and the force on the part in its hand; it never reads where a part is.
 """

@@ -1,4 +1,4 @@
-"""Two laws of motion that follow a force: across the hole until the part drops in, and on into the hole.
+"""Laws of motion that follow a force across a hole and into it.
 
 The robot calls a law once a physics step with the force on the part in the hand; it returns where the tip goes next.
 """

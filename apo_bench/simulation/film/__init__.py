@@ -1,1 +1,1 @@
-"""What happened in a trial, kept moment by moment, and shown: as a film, in a window, in a browser."""
+"""Films and viewers of a trial that was kept moment by moment."""

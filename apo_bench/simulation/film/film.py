@@ -1,4 +1,7 @@
-"""A trial as a film: demonstration, then replay, with captions; near the parts, and the whole table beside it."""
+"""Write a trial as a film with captions.
+
+The large picture shows the parts, the small one the whole table.
+"""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -21,6 +24,7 @@ _LETTERS = 86  # in a line of the usual width
 _SIZE = (720, 480)
 _INSET = (192, 128)
 _SPEED = 2.0
+_PACE = f"x {_SPEED:g}"
 _FPS = 20.0
 _GIF_FPS = 8.0
 _ENDING_S = 2.5  # so long the end of a segment stands still, with what came of it
@@ -44,15 +48,13 @@ def write_film(assembly: Assembly, assembled: Poses, segments: Sequence[Segment]
 
 
 def frames(
-    assembly: Assembly, assembled: Poses, segments: Sequence[Segment], speed: float = _SPEED, fps: float = _FPS
+    assembly: Assembly, assembled: Poses, segments: Sequence[Segment], fps: float = _FPS
 ) -> Iterator[tuple[Picture, float]]:
     """The pictures of a film one after the other, and how long each is shown, [s].
 
     Args:
         assembled: Where the parts are when all is done: the camera looks at them.
-        speed: How many times as fast as it was it is shown; stated in the picture.
     """
-    pace = "real time" if speed == 1.0 else f"x {speed:g}"
     for segment in segments:
         with ExitStack() as stack:
             views = []
@@ -61,13 +63,13 @@ def frames(
                 camera = aim_camera(*framing, FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)
                 views.append((stack.enter_context(renderer(segment.world.model, *size)), camera))
             data = make_initial_state(segment.world, segment.start)
-            for moment, force_n, most_n in sample_moments(segment.moments, speed / fps):
+            for moment, force_n, most_n in sample_moments(segment.moments, _SPEED / fps):
                 empty = moment.phase.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"
-                caption = Caption(segment.title, pace, _lines(assembly, moment), force)
+                caption = Caption(segment.title, _PACE, _lines(assembly, moment), force)
                 yield _draw(segment, data, moment, views, caption), 1.0 / fps
             ending = tuple(textwrap.wrap(segment.ending, _LETTERS, max_lines=2, placeholder=" .."))
-            caption = Caption(segment.title, pace, ending, good=segment.good)
+            caption = Caption(segment.title, _PACE, ending, good=segment.good)
             yield _draw(segment, data, segment.moments[-1], views, caption), _ENDING_S
 
 

@@ -1,4 +1,4 @@
-"""Carry out one operation by two hands: take, carry over the others, bring to its place, let go."""
+"""Carry out one operation by two hands."""
 
 import numpy as np
 

@@ -12,7 +12,6 @@ from apo_bench.geometry import Array, pose
 from apo_bench.records import parse_ft_noise
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, translate
-from apo_bench.simulation.robot.reach import joint_gradients
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
 from apo_bench.simulation.scene import switch_wrist_sensors_on
@@ -21,9 +20,7 @@ ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
 _SETTLE_S = 0.06
 """A low pass has forgotten its first reading but for 0.25 % then."""
-_SHIFT_M = 0.001  # shift of the tip by which the joint gradients are computed
-_TURN_RAD = 0.002  # turn of the tip by which they are computed
-_FAR_M = 0.0005  # shifted farther than this, they are computed again
+_FAR_M = 0.0005  # shifted farther than this, how the joints turn is computed again
 _FAR_RAD = 0.0025  # or turned by more than this
 
 
@@ -35,19 +32,18 @@ def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
             where it began, (3,) world, [m], or None to end.
 
     Raises:
-        ExecutionAborted: The arm does not reach around there, or something went wrong on the way.
+        ExecutionAborted: Something went wrong on the way.
     """
     q = robot.q
     offset = np.zeros(3)
-    ends = [(translate(robot.T, axis, -_SHIFT_M), translate(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
-    J_inverse = robot.reached(joint_gradients(robot.scene.kinematics, ends, q, _SHIFT_M))
+    turns = robot.scene.kinematics.inverse_jacobian(q)[:, :3] @ robot.T[:3, :3].T
     force: Sequence[float] = robot.forces.net()
     passed = 0
     while (wanted := law(force)) is not None:
         offset = wanted
         passed += 1
-        force = robot.servo_step(q + offset @ J_inverse, passed)
-    robot.q = q + offset @ J_inverse
+        force = robot.servo_step(q + turns @ offset, passed)
+    robot.q = q + turns @ offset
     robot.T = translate(robot.T, offset, 1.0)
 
 
@@ -77,7 +73,7 @@ def read_wrist(robot: Robot, wrist: WristSensor) -> Iterator[None]:
         robot.wrist, robot.fidelity = before
 
 
-def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
+def zero(robot: Robot, wrist: WristSensor) -> None:
     """Stand still in free air; what the sensor shows on average, but for the known weights, is nothing from now on.
 
     Raises:
@@ -86,7 +82,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
     with read_wrist(robot, wrist):
         robot.stand()
         wrist.start_zero()
-        robot.wait(seconds)
+        robot.wait(ZERO_S)
         wrist.end_zero()
 
 
@@ -122,7 +118,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
         about: The point, (3,), world, [m]; it moves with the hand.
 
     Raises:
-        ExecutionAborted: The arm does not reach around there, or something went wrong on the way.
+        ExecutionAborted: Something went wrong on the way.
     """
     with read_wrist(robot, wrist):
         q = robot.q
@@ -131,7 +127,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
         J = _joint_turns(robot, q, about)
         passed = 0
         while (wanted := law(wrist.wrench(about + offset[:3]))) is not None:
-            q = q + (wanted - offset) @ J
+            q = q + J @ (wanted - offset)
             offset = np.array(wanted)
             taken = False
             while not taken:
@@ -147,12 +143,9 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
 
 
 def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
-    """How the joints turn, (6, joints), per metre along each axis and per radian about each through a point."""
+    """How the joints turn, (joints, 6), with the shift of a point, [m], and a turn about it, [rad], world."""
     T = robot.scene.kinematics.forward(q)
-    to = pose.at(about)
-    T_point_tip = pose.inverse(to) @ T
-    turns = []
-    for twists, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
-        ends = [(to @ pose.exp(-by * unit) @ T_point_tip, to @ pose.exp(by * unit) @ T_point_tip) for unit in twists]
-        turns.append(robot.reached(joint_gradients(robot.scene.kinematics, ends, q, by)))
-    return np.vstack(turns)
+    # The tip turns with the point and moves by the shift plus w x (tip - point); both in the frame of the tip.
+    R = T[:3, :3].T
+    twist = np.block([[R, -R @ pose.hat(T[:3, 3] - about)], [np.zeros((3, 3)), R]])
+    return np.asarray(robot.scene.kinematics.inverse_jacobian(q) @ twist)

@@ -1,4 +1,4 @@
-"""The contact forces that a robot reads: on what is in its hand, behind a filter, and on the arm."""
+"""The contact forces that a robot reads."""
 
 import math
 from collections.abc import Sequence
@@ -51,11 +51,11 @@ class ForceSensors:
         self._free = work.free
         self._names = (*work.free, *work.fixed)
         contacts = sensordata[: 3 * (len(work.free) + len(self._names))]
-        self._sensors = contacts
+        self.sensors = contacts
+        """The contact sensors as the last step left them."""
         self._on_arm_flat = contacts[3 * len(work.free) :]
         self._on_arm = self._on_arm_flat.reshape(-1, 3)
         self._net_of_sensors = np.zeros((3, len(contacts)))
-        self._net = np.zeros(3)
         self._handled: int | None = None
         self.held: tuple[str, ...] = ()
         self.wrist = LowPass(WRIST_S)
@@ -80,14 +80,17 @@ class ForceSensors:
 
     def net(self) -> list[float]:
         """The net force of everything but the gripper on what is in the hand, (3,) world, [N]."""
-        net: list[float] = np.dot(self._net_of_sensors, self._sensors, self._net).tolist()
+        net: list[float] = np.dot(self._net_of_sensors, self.sensors).tolist()
         return net
 
-    def read(self, step_s: float) -> list[float]:
-        """The net force in the last step, (3,) world, [N]; the sensor at the wrist takes it up."""
-        force = self.net()
-        self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
-        return force
+    def push(self, guard: Guard) -> Array:
+        """What the sensors are multiplied by for the force against a guard."""
+        return np.asarray(-guard.direction @ self._net_of_sensors)
+
+    def take(self, sensors: Array, step_s: float) -> None:
+        """Let the sensor at the wrist take up the sensors of some steps, (k, sensors)."""
+        for force in (sensors @ self._net_of_sensors.T).tolist():
+            self.peak_n = max(self.peak_n, math.hypot(*self.wrist(force, step_s)))
 
     def load(self) -> float:
         """The weight on the gripper, [N]: of the held part and of what really hangs on it."""

@@ -45,11 +45,10 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
         wanted = T_world_tip @ carried.T_tip_part
         if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:
             shift = wanted @ pose.inverse(now)
+            velocity = np.array(data.qvel)
             for part in carried.parts:
-                v = world.dof[part]
-                velocity = np.array(data.qvel[v : v + 6])
                 set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
-                data.qvel[v : v + 6] = velocity
+            data.qvel[:] = velocity
             return carried
     return carried._replace(T_tip_part=pose.inverse(T_world_tip) @ now)
 

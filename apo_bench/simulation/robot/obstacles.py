@@ -128,10 +128,9 @@ def _near(
             look = may[:, i] & ~near
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
-                near[look] = (
-                    measure_intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
-                    > -margin
-                )
+                T = obstacles[i].T
+                depths = measure_intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, T, margin, margin)
+                near[look] = depths > -margin
     return near
 
 

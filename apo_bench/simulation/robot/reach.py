@@ -99,25 +99,6 @@ def feedforward_command(path: Array, velocity: Array, lead: Array, stick: Array)
     return np.asarray(path + (lead * velocity + stick * np.tanh(velocity / _CREEP_RAD_S)))
 
 
-def joint_gradients(kinematics: Kinematics, ends: Sequence[tuple[Array, Array]], q: Array, by: float) -> Array | None:
-    """How the joints turn while the tip is moved in some ways, (ways, joints), [rad] per unit; None out of reach.
-
-    By central differences of the inverse kinematics: as good as exact over some millimetres.
-
-    Args:
-        ends: For each way, tip poses (4, 4) so much before and behind where the joints are q.
-        by: How much, in the unit of the ways.
-    """
-    turns = []
-    for before, behind in ends:
-        first = kinematics.inverse(before, q)
-        second = kinematics.inverse(behind, q)
-        if first is None or second is None:
-            return None
-        turns.append((second - first) / (2 * by))
-    return np.array(turns)
-
-
 def limit_speed(
     kinematics: Kinematics, line: Trajectory, q: Array, limit: Array | None
 ) -> tuple[Trajectory, Knots | None]:

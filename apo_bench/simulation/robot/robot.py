@@ -174,10 +174,10 @@ class Robot:
         to = q if velocity is None else feedforward_command(q, velocity, self._lead, self._stick)
         self.data.ctrl[self._drives] = to + self._off
         mujoco.mj_step(self.model, self.data)
-        force = self.forces.read(self.step_s)
+        self.forces.take(self.forces.sensors[None], self.step_s)
         if passed % self._steps_of_tick == 0:
             self._look()
-        return force
+        return self.forces.net()
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still; each physics step may be taken in so many parts."""
@@ -322,27 +322,33 @@ class Robot:
         """
         model = self.model
         data = self.data
+        ctrl = data.ctrl
         if self.wrist is None and not self.forces.held:
             with switch_sensors_off(model):
                 for command in commands[:-1]:
-                    data.ctrl[:] = command
+                    ctrl[:] = command
                     mujoco.mj_step(model, data)
-            data.ctrl[:] = commands[-1]
+            ctrl[:] = commands[-1]
             mujoco.mj_step(model, data)
             return 0
         step_s = float(model.opt.timestep)
-        a, b, c = (0.0, 0.0, 0.0) if guard is None else guard.direction.tolist()
+        sensors = self.forces.sensors
+        rows = np.empty((len(commands), len(sensors)))
+        push = None if guard is None else self.forces.push(guard)
         newton = math.inf if guard is None else guard.newton
-        for steps, command in enumerate(commands, start=1):
-            data.ctrl[:] = command
+        stopped = False
+        steps = 0
+        while not stopped and steps < len(commands):
+            ctrl[:] = commands[steps]
             mujoco.mj_step(model, data)
-            x, y, z = self.forces.read(step_s)
+            rows[steps] = sensors
+            steps += 1
             if self.wrist is not None:
-                if self.wrist.take(step_s) and self.wrist.stops(guard):
-                    return steps
-            elif -(x * a + y * b + z * c) > newton:
-                return steps
-        return 0
+                stopped = self.wrist.take(step_s) and self.wrist.stops(guard)
+            elif push is not None:
+                stopped = bool(sensors.dot(push) > newton)
+        self.forces.take(rows[:steps], step_s)
+        return steps if stopped else 0
 
     def _look(self) -> None:
         """Once a tick: stability, contact force on the held part, blows to other parts; then the hook."""

@@ -1,4 +1,4 @@
-"""A sensor of force and torque at the wrist, as arms have it: noise, an offset, a low pass, and what it cannot know.
+"""A sensor of force and torque at the wrist, with noise, an offset and a low pass.
 
 It measures what the arm exerts on its hand. What the surroundings exert on the hand, and on what is in it, is that, the
 other way round, less the weights. The robot knows the weight of its hand by its own model, that of a part by the part

@@ -1,4 +1,4 @@
-"""The scene: room, parts and arm as MuJoCo models, pictures of them, and where parts come to rest when let go."""
+"""Scenes of parts and an arm as MuJoCo models."""
 
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, project_to_pixels

@@ -1,4 +1,4 @@
-"""Choose by contact bits which pieces can meet: a wall of a hole, and what is narrow enough to enter there.
+"""Choose by contact bits which pieces can meet.
 
 What is wider than a hole without its walls does not go in, and what is behind the walls holds it up: contacts with the
 walls themselves are not needed. It may dig in with an edge, by the thickness of the walls deeper than it would. All

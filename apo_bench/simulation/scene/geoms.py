@@ -1,4 +1,6 @@
-"""Convex pieces as geoms of MuJoCo: boxes and cylinders as what they are, everything else as the mesh of its corners.
+"""Make convex pieces geoms of MuJoCo.
+
+Boxes and cylinders stay what they are; everything else becomes the mesh of its corners.
 
 MuJoCo moves and turns a mesh into the frame of its own inertia, and the pose of the geom undoes that: corners in the
 frame of the part are found there again, where the geom has no pose.

@@ -1,4 +1,4 @@
-"""Draw pictures and films of a scene. Nothing here is needed to simulate."""
+"""Draw pictures and films of a scene."""
 
 import weakref
 from collections.abc import Callable, Iterable

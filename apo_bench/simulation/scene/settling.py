@@ -1,9 +1,9 @@
-"""A baseline: put the parts where they were seen, let go, and take the poses at which physics brings them to rest.
+"""The corrector `physics-settle` takes the poses at which observed parts come to rest.
 
-Operation by operation, as the goals come: the main part is put where it was seen, lifted by `LIFT_M`, with what it
-carries; then everything moves under gravity and contact, in the same soft contacts as replays, until it rests. The
-pose of the main part is the corrected goal, and all parts stay where they came to rest. For the first `SOFT_S` the
-parts move as in syrup, so that those that were put inside each other part slowly instead of leaping.
+Operation by operation the main part is put where it was observed, with what it carries; then everything moves under
+gravity and contact, in the same soft contacts as replays, until it rests. The pose of the main part is the corrected
+one, and all parts stay where they came to rest. For the first `SOFT_S` the parts move as in syrup, so that those that
+were put inside each other part slowly instead of leaping.
 
 Physics knows neither which faces should touch nor how uncertain a pose is, so contacts and covariances are not looked
 at. Fit faces recede by the play that the observation states, or by `CLEARANCE_M`; all parts have one density.
@@ -22,8 +22,6 @@ from apo_bench.simulation.physics import Physics, physics, set_contact, set_opti
 from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, get_part_pose, has_failed, make_initial_state, set_part_pose, world
 
-LIFT_M = 0.0
-"""How far above where it was seen a part is let go, tuned."""
 CLEARANCE_M = 0.25e-3
 """Play per side of fit faces where none is stated, since parts without any cannot be put together."""
 _DENSITY = 600.0  # [kg/m^3], of wood, as in the part files
@@ -38,7 +36,7 @@ _SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
 _SLOW.flags.writeable = False
 
 
-def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
+def settle(observation: Observation) -> Correction | Array:
     """Where the parts come to rest, (n, 4, 4), world frame, [m].
 
     Returns:
@@ -56,7 +54,7 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
     scene = _world(observation)
     data = make_initial_state(scene, observation.start)
     for k, operation in enumerate(observation.assembly.operations):
-        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.poses[k])
+        _put(scene, data, operation.moves, observation.poses[k])
         try:
             _rest(scene, data)
         except mujoco.FatalError:

@@ -1,4 +1,4 @@
-"""Walls of holes apart from what is behind them, so that a part with a hole rests on few pieces instead of on all.
+"""Separate the walls of a hole from what is behind them, so that its part rests on few pieces.
 
 A hole is cut into many wedges, each of which may reach to the outside of the part. A part that lies on a table would
 touch it with each of them, at four points. Here a wedge is cut in two: the wall, and what is behind it; the latter is

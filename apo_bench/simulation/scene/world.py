@@ -164,11 +164,9 @@ def take_snapshot(world: World, data: Any, start: Poses) -> Snapshot:
 
 def touches_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
     """Whether any of these movable parts touches another part; that they touch each other, or the arm, is not meant."""
-    ours = np.array([world.free.index(part) for part in parts])
-    a, b = _contact_parts(world, data)
-    mine = np.isin(a, ours)
-    its = np.isin(b, ours)
-    return bool(((mine & (b >= 0)) | (its & (a >= 0)))[mine != its].any())
+    ours = {world.free.index(part) for part in parts}
+    pairs = zip(*(of.tolist() for of in _contact_parts(world, data)), strict=True)
+    return any(a >= 0 and b >= 0 and (a in ours) != (b in ours) for a, b in pairs)
 
 
 def _contact_parts(world: World, data: Any) -> tuple[Ints, Ints]:

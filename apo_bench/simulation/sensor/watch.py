@@ -1,4 +1,4 @@
-"""Watch a demonstration while it runs: the TV camera says when it is quiet, and then the range finder fires."""
+"""Record a demonstration by the range finder whenever the TV camera sees no change."""
 
 from dataclasses import dataclass
 from typing import Any, final

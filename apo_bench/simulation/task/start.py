@@ -1,4 +1,4 @@
-"""Where an episode starts: the operations before it are done, and the robot holds the part before its hole.
+"""Prepare the start of an episode, at which the robot holds the part before its hole.
 
 A start is a state of the physics and what the robot knows; made once, it is restored as often as wanted.
 """

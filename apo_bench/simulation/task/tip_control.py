@@ -1,4 +1,4 @@
-"""The arm between two actions: the tip moves by the action, gives way to force, and stops where it struck.
+"""Control the tip of the arm between two actions of an agent.
 
 The robot knows what it commands, its encoders, its opening, the force on the part in its hand and the wrench at its
 wrist; nothing here reads where a part is.
@@ -206,7 +206,7 @@ class TipControl:
         R = T[:3, :3]
         w = R.T @ self._R @ (self._turn - off[3:]) / PERIOD_S
         twist = np.concatenate([np.cross(w, -self._front), w])
-        back = np.linalg.pinv(robot.scene.kinematics.jacobian(robot.q))
+        back = robot.scene.kinematics.inverse_jacobian(robot.q)
         turning = back @ twist
         shifting = back[:, :3] @ R.T
         q = robot.q

@@ -1,4 +1,4 @@
-"""Where the closed, empty hand can touch what is fixed: three places of the floor around the goals, and walls.
+"""Places where the closed, empty hand can touch what is fixed.
 
 Known from the plan alone: estimated poses of what stands, and shapes.
 """
