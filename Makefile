@@ -1,5 +1,5 @@
 # Two commands do everything, on a machine with Python 3.11 to 3.14 and make:
-#   make sweep   set up, run a small benchmark (4 minutes on two cores), print the table, write the report
+#   make sweep   set up, run a small benchmark (a minute on two cores), print the table, write the report
 #   make test    set up, check style and types, build the documentation, run every test
 # and one the headline of the project (40 trials per cell take some two hours on two cores):
 #   make headline [TRIALS=40] [FIDELITY=near-contact]
@@ -7,7 +7,7 @@
 PYTHON ?= python3
 WORKERS ?= 2
 FIDELITY ?= near-contact
-sweep: TRIALS ?= 10
+sweep: TRIALS ?= 6
 sweep: OUT ?= runs/sweep
 headline: TRIALS ?= 40
 headline: OUT ?= runs/headline_$(FIDELITY)

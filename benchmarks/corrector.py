@@ -1,20 +1,19 @@
-"""Time correctors and compare them with the optimum: `python benchmarks/corrector.py [--draws N]` (two minutes).
+"""Time correctors and compare them with the optimum: `python benchmarks/corrector.py` (two minutes).
 
 Observations are Gaussian around an exactly consistent configuration, 2 mm and 1 degree per axis. The optimum is the
 shortest whitened correction that closes every contact, found by SciPy's SLSQP on the contact equations; nothing of the
-corrector is used for it. Writes docs/results/corrector.md.
+corrector is used for it. `benchmarks.speed` puts the table on its page.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from apo_bench.assembly import build_contact_equations
 
@@ -27,9 +26,10 @@ from scipy.optimize import minimize
 
 from apo_bench import Correction, Observation, correct, correct_many
 from apo_bench.geometry import Array, compute_right_jacobian, pose
+from benchmarks.corrector_peers import peers
 from benchmarks.corrector_problems import observe, problem
+from benchmarks.rates_by_condition import table
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "corrector.md"
 PROBLEMS = ("fig2", "fig3", "fig6", "chain20")
 WITH_OPTIMUM = ("fig2", "fig3", "fig6")
 METHODS = ("paper", "least-squares", "contact", "contact-robust")
@@ -87,7 +87,7 @@ def spend(call: Callable[[], Sequence[Correction]]) -> tuple[float, Sequence[Cor
     return 1e3 * (time.process_time() - start), made
 
 
-def measure(method: str, observations: Sequence[Observation]) -> Measured:
+def measure(method: Any, observations: Sequence[Observation]) -> Measured:
     """Time a method on every observation, after one call that warms up."""
     if method == MANY:
         correct_many(observations[:2])
@@ -95,73 +95,40 @@ def measure(method: str, observations: Sequence[Observation]) -> Measured:
         times = [ms / 100 for ms, _ in batches]
     else:
         correct(observations[0], method)
-        batches = [spend(partial(correct_one, observation, method)) for observation in observations]
+        batches = [spend(lambda o=observation: (correct(o, method),)) for observation in observations]
         times = [ms for ms, _ in batches]
     made = [correction for _, corrections in batches for correction in corrections][: len(observations)]
     lengths = [np.linalg.norm(whitened(o, c.poses)) for o, c in zip(observations, made, strict=True)]
     return Measured(float(np.median(times)), 1e3 * max(c.gap_after_m for c in made), np.array(lengths))
 
 
-def correct_one(observation: Observation, method: str) -> Sequence[Correction]:
-    """Correct one observation."""
-    return (correct(observation, method),)
-
-
-def page(measured: dict[tuple[str, str], Measured], optima: dict[str, Array], draws: int) -> str:
-    """Return the page."""
-    text = f"""# Speed and accuracy of correctors
-
-Written by `python benchmarks/corrector.py --draws {draws}`: Fig. 2, 3 and 6 of the paper and a chain of 20
-castles, with {draws} Gaussian observations each, 2 mm and 1 degree (1 sigma per axis).
-
-## Time of a correction
-
-Median processor time in ms, one thread, from an observation to its `Correction` with test and posterior.
-
-{table(PROBLEMS, lambda name, method: f"{measured[name, method].ms:.2f}")}
-
-## Remaining contact gap
-
-Largest gap over all draws and contacts, in mm.
-
-{table(PROBLEMS, lambda name, method: f"{measured[name, method].gap_mm:.1e}")}
-
-## Distance from the optimum
-
-A correction is as long as its whitened twist |z|, in standard deviations of the observation. The table has the largest
-|z| / |z*| - 1 over all draws; z* is the shortest correction that SciPy's SLSQP finds. Methods that do not weight a
-correction by the noise are longer.
-
-{table(WITH_OPTIMUM, lambda name, method: f"{np.max(measured[name, method].lengths / optima[name]) - 1.0:.1e}")}
-"""
-    return text
-
-
-def table(problems: Sequence[str], cell: Callable[[str, str], str]) -> str:
-    """Return a table of Markdown: a line for each method, a column for each problem."""
-    lines = [f"| method | {' | '.join(problems)} |", "|---" * (1 + len(problems)) + "|"]
-    lines += [f"| `{m}` | {' | '.join(cell(name, m) for name in problems)} |" for m in (*METHODS, MANY)]
-    return "\n".join(lines)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--draws", type=int, default=20, help="observations of each problem (20)")
-    draws = parser.parse_args().draws
-    measured = dict[tuple[str, str], Measured]()
-    optima = dict[str, Array]()
+def table_of_correctors(draws: int = 20) -> list[str]:
+    """Return lines of Markdown: time, gap and length of the corrections of every method, and of peers if installed."""
+    methods: dict[str, Any] = {f"`{name}`": name for name in (*METHODS, MANY)} | peers()
+    rows = {name: list[str]() for name in methods}
+    gaps = dict.fromkeys(methods, 0.0)
+    excess = dict.fromkeys(methods, 0.0)
     for name in PROBLEMS:
         of = problem(name)
         observations = [observe(of, seed) for seed in range(draws)]
-        for method in (*METHODS, MANY):
-            measured[name, method] = measure(method, observations)
+        optima = None
         if name in WITH_OPTIMUM:
-            begins = [whitened(observation, of.poses) for observation in observations]
-            found = [find_optimum(o, z) for o, z in zip(observations, begins, strict=True)]
-            optima[name] = np.array([np.linalg.norm(z) for z in found])
-    PAGE.write_text(page(measured, optima, draws), encoding="utf-8")
-    print(f"Wrote {PAGE}")
+            optima = [np.linalg.norm(find_optimum(o, whitened(o, of.poses))) for o in observations]
+        for label, method in methods.items():
+            made = measure(method, observations)
+            rows[label].append(f"{made.ms:.2f}")
+            gaps[label] = max(gaps[label], made.gap_mm)
+            if optima is not None:
+                excess[label] = max(excess[label], float(np.max(made.lengths / optima)) - 1.0)
+    heads = ("method", *PROBLEMS, "largest gap, mm", "excess length")
+    return [
+        "Median processor time of a correction in ms, one thread: figures of the paper and a chain of 20 castles,",
+        f"{draws} observations each, 2 mm and 1 degree (1 sigma per axis). Excess length: the largest |z| / |z*| - 1",
+        "in fig2, fig3 and fig6, with z* the shortest correction that SciPy's SLSQP finds.",
+        "",
+        *table(heads, [[name, *rows[name], f"{gaps[name]:.0e}", f"{excess[name]:.0e}"] for name in methods]),
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    print(*table_of_correctors(), sep="\n")

@@ -1,7 +1,4 @@
-"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses.
-
-One file of more than 250 lines: `Assembly` is what is known for certain, and each of its questions is a few lines.
-"""
+"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses."""
 
 import math
 from bisect import bisect

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench import correct
-from benchmarks.corrector import find_optimum, whitened
+from benchmarks.corrector import MANY, METHODS, PROBLEMS, find_optimum, table_of_correctors, whitened
 from benchmarks.corrector_problems import observe, problem
 
 pytestmark = pytest.mark.numeric
@@ -22,3 +22,11 @@ def test_contact_makes_the_shortest_correction_that_closes_every_contact(name: s
     assert found.gap_after_m < 1e-10
     assert np.linalg.norm(whitened(observation, found.poses)) == pytest.approx(np.linalg.norm(best), rel=1e-6)
     assert np.linalg.norm(whitened(observation, correct(observation, "paper").poses)) > np.linalg.norm(best)
+
+
+def test_the_table_has_every_method_and_every_problem() -> None:
+    lines = table_of_correctors(draws=1)
+    assert [line.split("|")[1].strip() for line in lines if line.startswith("| `")] == [
+        f"`{m}`" for m in (*METHODS, MANY)
+    ]
+    assert all(line.count("|") == len(PROBLEMS) + 4 for line in lines if line.startswith("| "))

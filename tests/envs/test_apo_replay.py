@@ -304,18 +304,9 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     assert watched.trial == calls[1] != calls[0]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"noise_level": "1"}, "level of APOReplay must be a number or a list"),
-        ({"noise": "isotropc"}, "did you mean 'isotropic'"),
-        ({"noise_levl": 1}, "unknown argument of APOReplay 'noise_levl'; did you mean 'noise_level'"),
-        ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
-    ],
-)
-def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        APOReplay(**arguments)
+def test_an_unknown_argument_names_the_nearest() -> None:
+    with pytest.raises(InputError, match="unknown argument of APOReplay 'noise_levl'; did you mean 'noise_level'"):
+        APOReplay(noise_levl=1)
 
 
 def test_an_environment_without_reobservations_names_the_setting(small: APOReplay) -> None:

@@ -55,10 +55,6 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     ("arguments", "part"),
     [
         (("--operation", "4"), "--operation must be from 1 to 3, got 4"),
-        (
-            ("--noise-level", "1", "--observation", "docs/seen.csv"),
-            "--noise-level, which draws a trial, was given together with",
-        ),
     ],
 )
 def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:

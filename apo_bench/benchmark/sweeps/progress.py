@@ -29,7 +29,10 @@ def progress(total: int) -> Iterator[Count]:
 
 
 def _lines(total: int) -> Count:
-    """Says every minute how many trials have ended, and when the rest will have at this pace."""
+    """Says how many trials there are; then every minute how many have ended, and when the rest will at this pace."""
+    if total:
+        sys.stderr.write(f"0 of {total} trials\n")
+        sys.stderr.flush()
     began = printed = time.monotonic()
     ended = 0
 

@@ -1,7 +1,4 @@
-"""What observations of one assembly ask of the solver: equations, inequalities, noise.
-
-The batch is the primitive: one observation is a batch of one.
-"""
+"""What a batch of observations of one assembly asks of the solver: equations, inequalities, noise."""
 
 from __future__ import annotations
 

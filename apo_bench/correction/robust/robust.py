@@ -1,7 +1,4 @@
-"""The corrector `contact-robust`: some observations may be grossly wrong, or missing; contacts tell which.
-
-It can ask to look again: at what it left out or did not see, and at what it is least sure of.
-"""
+"""The corrector `contact-robust`: finds observations that are grossly wrong or missing by their contacts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -200,22 +200,3 @@ def test_bad_noise_files_are_refused(before: str, after: str, message: str, tmp_
     with pytest.raises(InputError, match=message) as raised:
         make_noise(str(path), NOISE_LEVEL)
     assert str(path) in str(raised.value)
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        (
-            "1,0,1,good,1,2,3,4,5,6",
-            "line 2, column kind: inlier, turned, outlier or missed is needed, 'good' was given",
-        ),
-        ("1,0,1,inlier,1,2,3,4,5,190", "line 2, column turn_along_deg: a number of at most 180.01 is needed"),
-    ],
-)
-def test_bad_residuals_are_refused(line: str, message: str, folder: Path, tmp_path: Path) -> None:
-    path = tmp_path / "r.csv"
-    header = (folder / "whole.csv").read_text(encoding="utf-8").splitlines()[0]
-    path.write_text(f"{header}\n{line}\n", encoding="utf-8")
-    with pytest.raises(InputError, match=message) as raised:
-        make_noise(f"empirical:{path}", NOISE_LEVEL)
-    assert str(path) in str(raised.value)

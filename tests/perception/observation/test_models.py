@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.perception.observation.models.isotropic import IsotropicNoise, PerPartNoise, part_factors
-from apo_bench.perception.observation.noise import Noise, NoiseLevel, make_noise
+from apo_bench.perception.observation.noise import Noise, NoiseLevel
 from tests import scenes
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
@@ -36,13 +35,3 @@ def test_a_part_is_as_bad_in_every_operation() -> None:
     factor = part_factors(TOWER.assembly.solids, rng)
     assert_allclose(ratio[:, 0], [factor[o.main] for o in TOWER.assembly.operations], rtol=1e-6)
     assert_allclose(seen.covariance, ratio[:, :1, None] ** 2 * plain.covariance, rtol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["anisotropic", "camera", "correlated"])
-def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
-    """Positions by the one, turns by the other, whatever frame they are drawn in."""
-    sizes = []
-    for noise_level in (NoiseLevel(1.0, 0.5), NoiseLevel(4.0, 1.0)):
-        xi = twists(see(make_noise(name, noise_level), 2), TOWER.nominal_poses).reshape(3, 2, 3)
-        sizes.append(np.linalg.norm(xi, axis=2))
-    assert_allclose(sizes[1] / sizes[0], np.tile([4.0, 2.0], (3, 1)), rtol=1e-6)

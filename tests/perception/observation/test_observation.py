@@ -73,8 +73,6 @@ def test_what_make_noise_refuses(given: object, noise_level: NoiseLevel, message
 
 
 GOOD = scenes.seen(TOWER, TOWER.nominal_poses)
-SKEWED = GOOD.covariance.copy()
-SKEWED[1, 0, 1] = 1e-7
 
 
 @pytest.mark.parametrize(

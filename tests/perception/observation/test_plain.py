@@ -49,10 +49,6 @@ def test_goals_and_declared_deviations_become_an_observation(wrap) -> None:
     ("given", "message"),
     [
         (lifted, "whose deviation_mm is None; set lifted.deviation_mm to a number from 0 to 10000"),
-        (
-            with_deviations(lifted, 1.0, "2"),
-            "whose deviation_deg is '2'; set noise.deviation_deg to a number from 0 to 180",
-        ),
     ],
 )
 def test_declarations_that_are_missing_or_make_no_sense(given, message: str) -> None:
