@@ -51,15 +51,9 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert (np.abs(left.astype(int) - right) > 40).any(axis=-1).mean() > 0.005
 
 
-@pytest.mark.parametrize(
-    ("arguments", "part"),
-    [
-        (("--operation", "4"), "--operation must be from 1 to 3, got 4"),
-    ],
-)
-def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["inspect", "poses", "stick_in_tower", *arguments]) == 2
+def test_an_operation_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["inspect", "poses", "stick_in_tower", "--operation", "4"]) == 2
     said = capsys.readouterr()
-    assert part in said.err
+    assert "--operation must be from 1 to 3, got 4" in said.err
     assert said.err.count("\n") == 1
     assert not Path("poses.png").exists()

@@ -53,19 +53,6 @@ def test_any_extruded_polygon_comes_back_with_its_volume(ring: list[tuple[float,
     assert caps == pytest.approx(2.0 * area(ring), rel=1e-9), "triangles of a cap lie side by side"
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("v 0 0 0\nv 10 10 0\nv 10 0 0\nv 0 12 0\nf 1 2 3 4\n", "face 1 crosses itself"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "no OBJ file that can be read"),
-    ],
-)
-def test_what_is_no_mesh_is_refused_in_one_sentence(text: str, sentence: str) -> None:
-    with pytest.raises(InputError, match=sentence) as raised:
-        read_obj(Path("a.obj"), text.encode())
-    assert "\n" not in str(raised.value)
-
-
 def test_a_concave_face_that_another_program_cut_into_a_fan_is_refused(tmp_path: Path) -> None:
     """Such a mesh is closed and has the right volume, but its triangles lie on each other."""
     raw = prism(U_SHAPE, 20).to_mesh()
