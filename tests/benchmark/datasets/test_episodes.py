@@ -43,7 +43,7 @@ def test_an_episode_is_a_trial(made: Path) -> None:
     assert {name: one[name] for name in ("config_hash", "success", "sentence", "method", "sim_time_s")} == {
         name: row[name] for name in ("config_hash", "success", "sentence", "method", "sim_time_s")
     }
-    goals = [pose.unpack(np.reshape(one[f"{name}_goals"], (-1, 7))) for name in ("seen", "true", "planned")]
+    goals = [pose.unpack(np.reshape(one[f"{name}_poses"], (-1, 7))) for name in ("observed", "true", "planned")]
     errors = [np.linalg.norm((T - goals[1])[:, :3, 3]) for T in goals]
     assert errors[2] < errors[0]
     assert np.reshape(one["covariance"], (2, 6, 6)).shape[0] == len(one["seen"]) == len(one["main_parts"])
