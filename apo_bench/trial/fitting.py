@@ -57,7 +57,10 @@ class FittingPlan:
 
     @property
     def sentence(self) -> str:
-        """A sentence such as `moved where contacts leave it free: operation 5 (cube) by 9.6 mm; otherwise ..`; may be empty."""
+        """The moves in words, such as `moved where contacts leave it free: operation 5 (cube) by 9.6 mm; otherwise ..`.
+
+        Empty if nothing was moved.
+        """
         if not self.moves:
             return ""
         mains = [operation.main for operation in self.plan.assembly.operations]

@@ -181,7 +181,7 @@ class _Search(NamedTuple):
         return None
 
     def elsewhere(self) -> Array | None:
-        """A point that fits, searched from the evenly spread points with the least total excess; None if none was found."""
+        """A point that fits, searched from the evenly spread points with the least total excess; None if there is none."""
         points = sorted(even_points(len(self.space)), key=self._much)
         fitting_points = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
         return next((s for s in fitting_points if s is not None), None)
@@ -191,7 +191,12 @@ class _Search(NamedTuple):
         return float(np.maximum(self.excess(self.space.tangent(s)), 0.0).sum())
 
     def nearer(self, far: Array) -> Array:
-        """A nearer point that fits: the last on the line from `far` to 0, or one searched from just beyond that, if nearer."""
+        """A point that fits and is nearer to 0 than `far`, which fits.
+
+        Bisection on the line to 0 gives the last point that fits. A new search starts from the nearest point on the
+        line that
+        does not fit; its result is taken if it is nearer.
+        """
         inside = 1.0
         outside = 0.0
         # bisection between a point that fits and zero, which does not

@@ -76,10 +76,10 @@ def own_files(name: str) -> tuple[Path, ...]:
 
 
 def digest_files(paths: Iterable[Path]) -> str:
-    """16 hexadecimal digits over what stands in files, in their order.
+    """16 hexadecimal digits over the contents of files, in order.
 
     Raises:
-        InputError: One of them cannot be read.
+        InputError: A file cannot be read.
     """
     found = []
     for path in paths:
@@ -92,26 +92,27 @@ def digest_files(paths: Iterable[Path]) -> str:
 
 
 def digest(content: bytes) -> str:
-    """16 hexadecimal digits."""
+    """16 hexadecimal digits of SHA-256."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 @cache
 def _module_digest(module: str) -> str | None:
-    """Over the source files of a module at the first call; None if it has none."""
+    """Digest of the source files of a module at the first call; None if it has none."""
     files = module_files(module)
     return digest_files(files) if files else None
 
 
 def module_files(module: str) -> tuple[Path, ...]:
-    """The source files of a module and of what it imports from the same folder; nothing is imported.
+    """The source files of a module and of its imports from the same folder, found without running it.
 
-    Of a module that is installed among other packages, only its own package counts.
+    For a module installed in site-packages, only files of its own package count.
     """
     top = module.partition(".")[0]
     spec = find_spec(top) or find_own_module(top)
     if spec is None or not spec.has_location or spec.origin is None:
         return ()
+    # of a package one folder above its own
     home = Path(spec.origin).parents[spec.submodule_search_locations is not None]
     others = ["apo_bench"]
     if home in {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")}:
@@ -131,7 +132,7 @@ def _scenario_digest(scenario: Scenario, source: str | Path | Scenario) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Nested dataclasses, mappings, sets and arrays as values that `json` can write; paths, hashed elsewhere, become None."""
+    """Nested dataclasses, mappings, sets and arrays as values for `json`; paths, hashed elsewhere, become None."""
     if is_dataclass(value):
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, np.ndarray):

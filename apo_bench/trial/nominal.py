@@ -37,7 +37,7 @@ def fit_nominal_poses(nominal: Array, observation: Observation) -> Array:
 
 
 def move_nominal_poses(nominal: Array, observation: Observation) -> Array:
-    """Move the nominal poses, (n, 4, 4), [m], on the table so that the first observed operation matches in x, y and yaw."""
+    """Move the nominal poses, (n, 4, 4), [m], on the table to match the first observed operation in x, y and yaw."""
     k = int(np.argmax(observation.observed))  # the first observed operation
     # of the whole motion from nominal to observed only the yaw and the shift on the table are taken
     T = observation.poses[k] @ pose.inverse(nominal[k])

@@ -57,7 +57,7 @@ def _test(correction: Correction | None) -> TrialRecord:
 
 
 def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Array | None) -> TrialRecord:
-    """Whether the truth lies in the 95 % region of the correction, and the pose errors of the plan; empty without a truth."""
+    """Whether the 95 % region of the correction contains the truth, and the plan's pose errors; empty without a truth."""
     if truth is None:
         return {}
     correction = result.correction
@@ -71,7 +71,7 @@ def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Arr
 
 
 def method_columns(result: MethodResult) -> TrialRecord:
-    """Columns on what the method did: corrected operations, tried corrections, gaps, extra steps and fit adjustments."""
+    """Columns of the method: corrected operations, tried corrections, gaps, extra steps and fit adjustments."""
     columns: TrialRecord = {
         "corrected_operations": [],
         "tried_corrections": [],
@@ -141,7 +141,7 @@ def _probing(found: ProbingResult | None) -> TrialRecord:
 
 
 def _slip(each: SlipInHand) -> GraspSlip:
-    """How a part was carried off by its errors, and how it slipped in the hand, in mm and degrees."""
+    """How far a part had moved in the hand when its last motion began (`carried_*`), and at release; mm and degrees."""
     return {
         "operation": each.operation + 1,
         "carried_mm": 1e3 * each.carried_m,

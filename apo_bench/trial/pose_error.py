@@ -55,7 +55,7 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
 
 
 def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
-    """`goals` with parts of revolution rotated about their axes to be nearest to the truth, unless they carry others."""
+    """`goals` with parts of revolution rotated about their axes nearest to the truth, unless they carry others."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
     return np.array([T if solid is None else find_least_turned(solid, T, true) for solid, T, true in pairs]).reshape(

@@ -1,4 +1,4 @@
-"""The stages that all methods share: demonstrate, observe, replay, judge; every random number of a trial is drawn here."""
+"""Stages that all methods share: demonstrate, observe, replay, judge; every random number of a trial is drawn here."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def stream_key(seed: int, which: int, secret_seed: SecretSeed | None = None) -> 
 def simulate_demonstration(
     scene: Scene, human_error_scale: float, seed: int, pose_source: str = "noise", secret_seed: SecretSeed | None = None
 ) -> SimulatedDemonstration:
-    """Draw the layout of a trial and let the human demonstrate on it; with `depth-camera` as pose source, record images."""
+    """Draw the layout of a trial and simulate the demonstration on it; `depth-camera` as pose source records images."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, secret_seed), scene.clearance_mm)
     rng = stream(seed, DEMONSTRATION, secret_seed)
     if pose_source != DEPTH_CAMERA:
@@ -167,7 +167,7 @@ def demonstration_failure(demonstration: Demonstration) -> Outcome:
 
 
 def observation_failure(observation: Observation) -> Outcome | None:
-    """The ending of a trial in which an operation was not observed, so the observed poses are no plan; None if all were."""
+    """The ending of a trial in which an operation was not observed, so the observed poses are no plan; None otherwise."""
     if observation.observed.all():
         return None
     k = int(np.argmin(observation.observed))  # the first operation that was not observed

@@ -185,7 +185,7 @@ def _insertion(layer: Layer, layers: Sequence[Layer], way: StraightExit) -> Macr
 
 
 def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
-    """The guarded motions that close the contacts of a layer, one by one: downwards onto supports first, then sideways."""
+    """The guarded motions that close the contacts of a layer, one by one: down onto supports first, then sideways."""
     macros: list[Macro] = []
     left = layer.breaks
     closed_before = layer.keeps
@@ -252,7 +252,7 @@ def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tu
 
 
 def _along(direction: Array, along: Array) -> Array:
-    """The projection of a direction, (3,), onto the span of orthonormal rows, (m, 3), as a unit vector; zero if tiny."""
+    """The projection of a direction, (3,), onto the span of orthonormal rows, (m, 3), as unit vector; zero if tiny."""
     within = direction if len(along) == 3 else along.T @ (along @ direction)
     size = float(np.linalg.norm(within))
     if size < 1e-6:

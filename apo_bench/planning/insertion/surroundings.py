@@ -1,4 +1,4 @@
-"""Parts and faces around a motion: slide directions, slow stretches, hole entrances, later walls, neighbouring parts."""
+"""Parts and faces around a motion: slide directions, slow stretches, hole entrances, later walls, neighbours."""
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
 
 
 def own_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
-    """Normals, (3,) each, of the faces of a part that have contacts in operation k; two directions across a round axis."""
+    """Normals, (3,) each, of the faces of a part that have contacts in operation k; a round face gives two."""
     faces = [assembly.face_of(of) for contact in assembly.operations[k].contacts for of in contact if of.part == part]
     return [n for face in faces for n in ([face.normal] if isinstance(face, Face) else face.frame[:3, :2].T)]
 

@@ -38,8 +38,8 @@ class Prediction:
     code: MeasureCode | Literal["ok", "unreachable_start", "unreachable"]
     sentence: str
     size_mm: float | None
-    """`residual`, `tip_error`: the |e| that exceeds its limit. `interference`, `gripper_room`: the penetration depth. `ok`:
-    the largest |e| of an insertion contact. None: unstable goal, leaning part, or out of reach."""
+    """`residual`, `tip_error`: the |e| that exceeds its limit. `interference`, `gripper_room`: the penetration depth.
+    `ok`: the largest |e| of an insertion contact. None: unstable goal, leaning part, or out of reach."""
     mendable: bool = False
     """Whether moving target poses along free directions of the contacts may prevent the failure."""
 

@@ -32,7 +32,7 @@ Solids = Mapping[str, Solid]
 
 @remember
 def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
-    """The parts as manufactured: fit faces recede by `clearance_mm`. The result is cached per assembly and clearance."""
+    """The parts as manufactured: fit faces recede by `clearance_mm`. Cached per assembly and clearance."""
     made = {
         name: replace(solid, pieces=shrink_pieces(solid, clearance_mm * 1e-3))
         for name, solid in assembly.solids.items()

@@ -106,8 +106,8 @@ class Measure(NamedTuple):
     """Counted from 0."""
     kind: MeasureKind
     size: float
-    """[mm]; negative for parts that are apart. `falls`, `leans`: the unbalanced share of the weight and of its moments on
-    a 10 mm arm."""
+    """[mm]; negative for parts that are apart. `falls`, `leans`: the unbalanced share of the weight and of its moments
+    on a 10 mm arm."""
     allowed: float
     """Largest size without a failure."""
     what: str = ""

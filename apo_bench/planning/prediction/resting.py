@@ -59,7 +59,8 @@ def enters(assembly: Assembly, contact: Contact) -> bool:
 
 
 def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> list[tuple[tuple[Array, Array], ...]]:
-    """The error e of each contact at the corners of its overlap, (k,), [m], and its normal; e > 0 if the faces are apart.
+    """The errors e of contacts at the corners of their overlaps, (k,), [m], positive if the faces are apart, and
+    normals.
 
     Flat faces that do not overlap in an area are measured at the corners of the whole environment face. A shaft on a
     plane
@@ -125,7 +126,9 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
-    """`_flat` for a shaft on a plane, or a plane on a shaft: least rotation to parallel, then a shift; of one alternative."""
+    """`_flat` of one alternative for a shaft on a plane, or a plane on a shaft: least rotation to parallel, then a
+    shift.
+    """
     touch = measure_contact(assembly, contact, poses)
     up = _up(assembly, contact, poses)
     middle = touch.points.mean(axis=0)
