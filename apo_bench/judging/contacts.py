@@ -1,4 +1,4 @@
-"""Measure the contacts of an assembly, on the nominal faces at the reached poses, and compare them with their limits."""
+"""Measure the contacts of an assembly, on nominal faces at the reached poses, and compare them with their limits."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -131,9 +131,7 @@ class ContactJudge(NamedTuple):
         )
 
     def _nearest_limit(self, case: ContactCase, gaps: Gaps | None) -> tuple[float, float | None]:
-        """(limit, gap), [mm], of the side, apart or deep, that exceeds its limit more; the gap is None without an
-        overlap.
-        """
+        """(limit, gap), [mm], of the side, apart or deep, that exceeds its limit more; gap None without an overlap."""
         lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
         deep = compute_deep_limit_mm(self.known.assembly, case.contact, *lengths)
         # The limit for faces apart is never smaller than that for faces deep.

@@ -62,8 +62,7 @@ def faults_of_place(
     seen: Poses,
     allowed_mm: float,
 ) -> Iterator[tuple[str, float]]:
-    """Displacements that spoil the finished assembly: the two parts in words, and how far a corner of either moved,
-    [m].
+    """Displacements that spoil the finished assembly: the two parts in words, and how far a corner moved, [m].
 
     - Two movable parts in contact at the end: their relative motion along free directions, since the later of their
     last
@@ -100,7 +99,7 @@ def faults_of_place(
 
 
 def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str], list[Contact]]:
-    """The contacts that are closed at the end, by the pair of parts; all fixed parts count as one, the first by name."""
+    """The contacts closed at the end, by the pair of parts; all fixed parts count as one, the first by name."""
     standing = dict[tuple[str, str], list[Contact]]()
     ground = min(assembly.fixed, default="")
     for contact, _, lost in assembly.relations():
@@ -113,20 +112,13 @@ def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str]
 
 
 def _is_mate(assembly: Assembly, contacts: Sequence[Contact], part: str, seen: Poses) -> bool:
-    """Whether the contacts of a part with fixed parts have normals in more than one direction."""
+    """Whether the contacts of a part with fixed parts have different normals, so that they locate it."""
     normals = np.array([touched.normal for touched in find_touched_contacts(assembly, contacts, [part], seen)])
     return len(normals) > 0 and float((normals @ normals[0]).min()) < _ONE_WAY
 
 
 def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, held: Array) -> float:
-    """The largest relative motion of a corner of two parts along directions that contacts leave free, [m].
-
-    The relative motion is a twist. The constrained share is removed so that the corners of both parts move the least.
-
-    Args:
-        put, final: Poses of all parts when the parts were placed, and at the end.
-        held: From `_held`.
-    """
+    """The largest relative motion of a corner of two parts along directions that their contacts leave free, [m]."""
     a, b = (assembly.solids[part] for part in parts)
     before, now = (pose.inverse(poses[parts[0]]) @ poses[parts[1]] for poses in (put, final))
     # The motion of b in the frame of a, as a twist of that frame: now = exp(twist) before.
@@ -158,8 +150,7 @@ def _held(known: Meetings, contacts: Sequence[Contact], parts: tuple[str, str], 
 
 
 def _free(twist: Array, held: Array, at: Array) -> Array:
-    """The free twist, (6,), nearest to `twist` by the motion of the points `at`, (k, 3), among those that `held`
-    admits.
+    """The free twist, (6,), nearest to `twist` by the motion of the points `at`, (k, 3); `held` has the constraints.
 
     With K the motion of the points by a twist and K^T K = L L^T, distances are those of L^T twist.
     """

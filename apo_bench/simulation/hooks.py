@@ -20,8 +20,8 @@ class Phase(NamedTuple):
     operation: int | None
     """Counted from 0; None before the first begins."""
     macro: str
-    """The macros of the motion, such as `insert-into, move-to-bottom`; else its stage, such as `pick`, `carry`; `by hand`
-    in a demonstration."""
+    """The macros of the motion, such as `insert-into, move-to-bottom`; else its stage, such as `pick`, `carry`;
+    `by hand` in a demonstration."""
     force_n: float
     """Contact force on the held part, [N], from the wrist sensor; 0 with an empty hand and in a demonstration."""
     undoes: bool = False
@@ -44,8 +44,8 @@ class Hooks:
     after_step: Callable[[Step], None] = _nothing
     """Called after an operation, once everything rests; not if it fails."""
     after_tick: Callable[[Any, Phase], None] | None = None
-    """Called with the `MjData` every tick of simulated time, in a demonstration also at its start. None: skipped stretches
-    of a simulation are not reconstructed."""
+    """Called with the `MjData` every tick of simulated time, in a demonstration also at its start. None: states in
+    skipped stretches of a simulation are not reconstructed."""
     tick_s: float = TICK_S
     """Length of a tick of a demonstration; a robot always uses `TICK_S`."""
 

@@ -181,7 +181,7 @@ class _Search(NamedTuple):
         return None
 
     def elsewhere(self) -> Array | None:
-        """A point that fits, searched from the evenly spread points with the least total excess; None if there is none."""
+        """A point that fits, searched from the evenly spread points with the least total excess; None if none fits."""
         points = sorted(even_points(len(self.space)), key=self._much)
         fitting_points = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
         return next((s for s in fitting_points if s is not None), None)

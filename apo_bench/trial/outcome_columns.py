@@ -57,7 +57,7 @@ def _test(correction: Correction | None) -> TrialRecord:
 
 
 def _truth(result: MethodResult, right: Assembly, given: Observation, truth: Array | None) -> TrialRecord:
-    """Whether the 95 % region of the correction contains the truth, and the plan's pose errors; empty without a truth."""
+    """Whether the 95 % region of the correction contains the truth, and the plan's pose errors; empty without truth."""
     if truth is None:
         return {}
     correction = result.correction

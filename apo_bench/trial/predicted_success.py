@@ -213,9 +213,7 @@ def draw_truths(explanation: PossibleTruth, count: int, rng: np.random.Generator
 
 
 def _widths(space: FreeSpace) -> Array:
-    """Standard deviation of draws along each free direction, (f,), relative to the stated one, bounded by
-    `_FARTHEST_*`.
-    """
+    """Standard deviation of draws along free directions, (f,), relative to the stated one, bounded by `_FARTHEST_*`."""
     far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
     turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
     return np.asarray(1.0 / np.maximum(1.0, np.maximum(far, turned)))

@@ -167,7 +167,7 @@ def demonstration_failure(demonstration: Demonstration) -> Outcome:
 
 
 def observation_failure(observation: Observation) -> Outcome | None:
-    """The ending of a trial in which an operation was not observed, so the observed poses are no plan; None otherwise."""
+    """The ending of a trial in which an operation was not observed, so there are no poses to plan with; else None."""
     if observation.observed.all():
         return None
     k = int(np.argmin(observation.observed))  # the first operation that was not observed

@@ -148,7 +148,7 @@ class Pushes(NamedTuple):
 
 
 def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
-    """Points and forces, (k, 3) each: forces along normals, and four edges of the friction cone around support normals."""
+    """Points and forces, (k, 3) each: forces along normals, and four edges of the friction cone of each support."""
     every = list(pushing)
     points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))  # fields 0 and 1: points, forces
     carrying = np.abs(n[:, 2]) >= _WALL

@@ -64,9 +64,7 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
 
 
 def _grip(model: Any, arm: Arm) -> tuple[float, float]:
-    """(force, friction): force of both pads together, [N], infinite if not limited; coefficient of friction of the
-    pads.
-    """
+    """(force of both pads together, [N], infinite if not limited; coefficient of friction of the pads)."""
     if arm.hand is not None:
         return 2 * arm.hand.force_n, arm.hand.friction
     force = float(model.actuator(f"arm/{arm.grip}").forcerange[1])

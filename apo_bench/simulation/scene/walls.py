@@ -138,7 +138,7 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
 
 
 def _tangents(face: RoundFace, outwards: Array, clearance_m: float) -> Array:
-    """Tangent planes (n, d) of a hole with its clearance, (k, 4), at directions across the axis, (k, 3)."""
+    """Tangent planes (n, d) of a hole with its clearance, (k, 4), at directions across its axis, (k, 3)."""
     # A wall of a cone of slope k has the normal (-u, k) / sqrt(1 + k^2) in (outwards, along the axis), and touches the
     # cone. The clearance moves it along its normal, so the radius by clearance / w.
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
@@ -160,8 +160,7 @@ def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
 
 
 def _as_one(a: _Wall, b: _Wall, first: Hull, clearance_m: float) -> Hull | None:
-    """Two neighbouring walls joined to one, tangent to the circle in the middle; None if that is too far from the
-    circle.
+    """Two neighbouring walls joined to one, tangent to the circle in the middle; None if too far from the circle.
 
     Args:
         first: Wall `a`, already cut off from the material behind.
