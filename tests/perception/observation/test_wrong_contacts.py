@@ -98,7 +98,7 @@ def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
     assert make_contacts("given") is None
     assert make_contacts("false-negative") is omit_contact
-    assert make_contacts("apo_bench.perception.observation.wrong_contacts:false") is add_contact
+    assert make_contacts("apo_bench.perception.observation.wrong_contacts:add_contact") is add_contact
     assert make_contacts("face-offset:3mm") == FaceOffset(3e-3)
     assert make_contacts(FaceOffset(1e-3)) == FaceOffset(1e-3)
 
