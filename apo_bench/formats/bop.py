@@ -15,10 +15,10 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import open_file
 
-_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
+_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")  # the first line of a results file
 _NUMBERS = 14
 """Numbers of score (1), R (9), t (3) and time (1)."""
-LARGEST_ID = 2**31 - 1
+LARGEST_ID = 2**31 - 1  # of a scene, an image or an object
 LARGEST_MM = 1e6  # of any number but the ids
 _NOT_A_ROTATION = 0.02
 """Largest element of R R^t - I: published truth is rounded, that of LM-O by 0.0096."""

@@ -16,6 +16,7 @@ LARGEST_TRUTH_BYTES = 64_000_000
 """A scene of a video in BOP format takes up to about 20 MB."""
 _Number = Annotated[float, Meta(ge=-LARGEST_MM, le=LARGEST_MM)]
 _Three = tuple[_Number, _Number, _Number]
+# A rotation matrix, row by row.
 _Nine = tuple[_Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number]
 
 

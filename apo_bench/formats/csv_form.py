@@ -25,8 +25,8 @@ from apo_bench.scenario import Scenario, place_layout
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
-_LENGTHS = {"mm": 1e-3, "m": 1.0}
-_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}
+_LENGTHS = {"mm": 1e-3, "m": 1.0}  # factors to m
+_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}  # factors to rad
 _COLUMNS: Columns = {
     **{name: (name, 1.0) for name in ("operation", "part")},
     **{f"{name}_{unit}": (name, size) for name in _POSITION for unit, size in _LENGTHS.items()},
@@ -37,7 +37,8 @@ _COLUMNS: Columns = {
     **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
 }
 """Name of a column -> its meaning, and the factor from its unit to m or rad."""
-_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)
+_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)  # meanings that must have a column
+# Values of the column `seen`.
 _FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
 
 

@@ -15,7 +15,7 @@ from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io import FileTable, Quadruple, Text, check_quaternion, write_file
 
 TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)  # factors from a twist in m and rad to mm and deg
-_FARTHEST_MM = 1e3 * FARTHEST_M
+_FARTHEST_MM = 1e3 * FARTHEST_M  # largest coordinate of a position
 Coordinate = Annotated[float, Meta(ge=-_FARTHEST_MM, le=_FARTHEST_MM)]
 Position = tuple[Coordinate, Coordinate, Coordinate]
 Number = Annotated[int, Meta(ge=1)]

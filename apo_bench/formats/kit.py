@@ -21,8 +21,8 @@ FORM_COLUMNS = {
     )
 }
 """Columns of the results form, as `read_csv` takes them; the kit fills in those up to `method`."""
-FORM_NAME = "form.csv"
-TAG_FAMILY = "tag36h11"
+FORM_NAME = "form.csv"  # the results form
+TAG_FAMILY = "tag36h11"  # of AprilTag
 TAG_EDGE_MM = 30.0  # edge of the black border of a tag, as tag detectors count it
 _TAG_PAPER_MM = 38.0  # edge of the paper of a tag, with a white margin of one module
 _TAG_AT_MM = 80.0  # distance of a tag's centre from the plate's, along x and along y

@@ -31,7 +31,7 @@ from apo_bench.scenario import Scenario, place_layout
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
 _LEAST_FREEDOM = 0.4  # least degrees of freedom of Student's t
 _TAIL_UNITS = TO_MM_DEG[[0, 0, 3, 3]]  # factors to mm, mm, deg, deg: across the ray, along it, tilt, turn
-_Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+_Row = tuple[Finite, Finite, Finite, Finite, Finite, Finite]  # a row of a covariance
 _Matrix = tuple[_Row, _Row, _Row, _Row, _Row, _Row]
 _Freedom = Annotated[float, Meta(ge=_LEAST_FREEDOM, le=1e300)]
 _RATES: Mapping[str, str] = {

@@ -12,14 +12,15 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
 }
 """Quantity -> unit -> factor to m, rad or s."""
-POSITION = ("x", "y", "z")
+POSITION = ("x", "y", "z")  # meanings of columns, here and below
 QUATERNION = ("qw", "qx", "qy", "qz")
-NUMBERED_QUATERNION = ("q0", "q1", "q2", "q3")
+NUMBERED_QUATERNION = ("q0", "q1", "q2", "q3")  # the camera file states their order
 ROTATION_VECTOR = ("rx", "ry", "rz")
 AXIS_AND_ANGLE = ("ax", "ay", "az", "angle")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 EULER_ANGLES = ("roll", "pitch", "yaw")
-NUMBERED_EULER_ANGLES = ("e1", "e2", "e3")
+NUMBERED_EULER_ANGLES = ("e1", "e2", "e3")  # about the axes that `euler` of the camera file states
+# A log has the columns of exactly one of these.
 ROTATIONS = (
     QUATERNION,
     NUMBERED_QUATERNION,

@@ -11,7 +11,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import check_separator, read_text
 
 LARGEST_LOG_BYTES = 200_000_000
-_TUM_COLUMNS = ("t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+_TUM_COLUMNS = ("t_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")  # TUM files have no line of names
 
 
 class LogTable(NamedTuple):

@@ -202,7 +202,7 @@ def time_taken(
 def end_of_operation(
     assembly: Assembly, intervals: RestIntervals, chosen: Sequence[RestInterval | None], k: int
 ) -> float:
-    """Return the time at which observed operation k was over, [s]: when the next one began, else the end of its rest."""
+    """Return the time at which observed operation k ended, [s]: when the next one began, else the end of its rest."""
     interval = chosen[k]
     assert interval is not None
     for j, later in enumerate(chosen):

@@ -15,10 +15,12 @@ from apo_bench.importers.recording.rests import Rest
 from apo_bench.importers.recording.tracks import Log
 from apo_bench.io import align_columns
 
+# Heads of the table of rests.
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "deviation of a frame")
 POSE_HEAD = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+# Columns of an observation file.
 OBSERVATION_HEAD = ("operation", "part", *POSE_HEAD, "deviation_mm", "deviation_deg", "seen")
-PATH_HEAD = ("operation", "part", "t_s", *POSE_HEAD)
+PATH_HEAD = ("operation", "part", "t_s", *POSE_HEAD)  # columns of a file of paths
 _POSE_UNITS = copy_frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """Factors from a packed pose, [m], to mm."""
 
