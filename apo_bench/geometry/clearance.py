@@ -113,7 +113,7 @@ def _recede_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
         return hull
     planes = np.array(hull.planes)
     planes[on, 3] -= clearance_m
-    # An interior point is needed to intersect half spaces: the mean of the corners, or else the centre of a ball inside.
+    # Intersecting half spaces needs an interior point: the mean of the corners, else the centre of the largest ball.
     inside = hull.corners.mean(axis=0)
     if (planes[:, 3] - planes[:, :3] @ inside).min() < _THINNEST_M:
         inside, radius = _middle(planes)

@@ -16,8 +16,7 @@ _PARALLEL = 1e-6
 
 
 def project_on_axes(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
-    """Project a piece, with its frame at the origin, on k axes: middle and half length of each interval, (k,) each,
-    [m].
+    """Project a piece, with its frame at the origin, on k axes: middle and half length of each interval, (k,), [m].
 
     Args:
         R: (3, 3), the orientation of the piece, world.

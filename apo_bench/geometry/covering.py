@@ -169,9 +169,7 @@ def _project(faces: Sequence[Face], T: Array) -> NDArray[np.object_]:
 
 @lru_cache(maxsize=4096)
 def _rings(face: Face) -> tuple[Array, tuple[int, ...]]:
-    """The corners of the outline and of all holes, one ring after the other, (k, 3), and the number of corners of
-    each.
-    """
+    """The corners of the outline and of all holes, ring after ring, (k, 3), and the number of corners of each ring."""
     rings = (face.outline, *face.holes)
     return np.concatenate(rings), tuple(map(len, rings))
 

@@ -320,8 +320,8 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
 
 
 def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> Iterator[tuple[float, float, bool]]:
-    """Intervals that pads with their tips at (t, h) can hold: (begin, end) along the rays, [m], and whether along a
-    line only.
+    """Intervals that pads with their tips at (t, h) can hold: (begin, end, line), [m], `line` if touched along one
+    only.
 
     Args:
         opening_m: Largest travel of each finger from the middle, [m].

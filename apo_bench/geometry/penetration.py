@@ -243,9 +243,7 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
-    """Centres and half sizes, (k, 3) each, of the world-aligned boxes around pieces turned by R about the origin,
-    [m].
-    """
+    """Centres and half sizes, (k, 3) each, [m], of world-aligned boxes around pieces turned by R about the origin."""
     corners, first = collect_corners(pieces)
     turned = corners @ R.T
     low = np.minimum.reduceat(turned, first)
@@ -306,8 +304,8 @@ def measure_drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 
 def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
-    """The index of the first of some drops, (k,), [m], at which `a` is deeper in `b` than `TOUCH_M`; None if of
-    none.
+    """The index in `ways`, (k,), [m], of the first drop at which `a` is deeper in `b` than `TOUCH_M`; None if none
+    is.
     """
     R_a, at = T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
     if all_boxes(a.pieces) and all_boxes(b.pieces):
