@@ -17,7 +17,8 @@ EXPORTS: dict[str, str] = {}
 """What `apo_bench` exports."""
 KEYS = {
     "extra_operations": "extra_steps",
-    "test_passes": "consistency_passes",
+    "test_passes": "consistent",
+    "dropped": "dropped_contacts",
     "seen_again": "reobservations",
     "wrong_relation": "wrong_contact",
     "touches_refused": "probe_contacts_rejected",

@@ -156,11 +156,11 @@ class TrialRecord(_Columns, total=False):
     """Degrees of freedom of `chi_square`."""
     p_value: _Share | None
     """p-value of `chi_square`."""
-    consistency_passes: bool | None
+    consistent: bool | None
     """Whether contacts and observed poses are consistent by that test."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
-    dropped: list[Name] | None
+    dropped_contacts: list[Name] | None
     """Contacts that the corrector left out."""
     rejected_observations: list[_Operation] | None
     """Operations that were inferred, since nothing was observed of them or the corrector rejects it."""

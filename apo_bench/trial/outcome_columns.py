@@ -41,7 +41,7 @@ def _test(correction: Correction | None) -> TrialRecord:
     if correction is None:
         return {}
     inferred: TrialRecord = {
-        "dropped": list(correction.dropped),
+        "dropped_contacts": list(correction.dropped),
         "rejected_observations": [k + 1 for k in correction.left_out],
     }
     test = correction.test
@@ -51,7 +51,7 @@ def _test(correction: Correction | None) -> TrialRecord:
         "chi_square": float(test.chi_square) if math.isfinite(test.chi_square) else None,
         "chi_square_dof": int(test.freedom),
         "p_value": replace_infinite(test.p_value),
-        "consistency_passes": bool(test.passes),
+        "consistent": bool(test.passes),
         "suspects": [suspect.relation for suspect in test.ambiguous],
     }
 

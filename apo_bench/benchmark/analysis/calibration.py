@@ -37,7 +37,7 @@ def _line(axes: Line, trials: Trials) -> Line:
     clearance = planned.number("clearance_mm")
     loose = clearance > 0
     inside = trials.number("inside_95")
-    passes = trials.number("consistency_passes")
+    passes = trials.number("consistent")
     known = trials.where((passes == 0) & ~trials.holds("wrong_contact", (None,).__contains__))
     named = [
         one in (all_ or ()) for one, all_ in zip(known.values("wrong_contact"), known.values("suspects"), strict=True)
