@@ -36,8 +36,8 @@ def draw_depth(run: DepthRun, out: Path, view: int = 0) -> None:
     for row, event in zip(grid, run.events, strict=False):
         row[0].set_ylabel(_describe(event), fontsize=9)
         _draw_row(row, run, event, view)
-    # the pictures show the pixels that ever changed, and some around
     # every picture is cropped to the pixels that changed in any event, with a margin
+    changed = [event.regions[view].appeared | event.regions[view].vanished for event in run.events]
     if np.any(changed):
         v, u = np.nonzero(np.any(changed, axis=0))
         for axes in grid[:, 1:].ravel():

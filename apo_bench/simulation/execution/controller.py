@@ -1,6 +1,6 @@
-"""The robot replays a plan, open loop in the poses and closed loop in force.
+"""Replay a plan with the robot: open loop in the poses, closed loop in force.
 
-Every method has the same controller.
+All correction methods are evaluated with this controller.
 """
 
 import math
@@ -20,9 +20,9 @@ from apo_bench.simulation.robot import ExecutionAborted, Robot
 from apo_bench.simulation.scene import Scene, allow_sleep, take_snapshot
 
 _SETTLE_S = 0.5
-"""At the end, everything is left alone this long."""
+"""Time that the robot stands still after the last operation."""
 _SHORTEST_STEP_S = 1.0
-"""Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
+"""Lower bound of the duration of a step; the fastest replay of the benchmark takes four seconds a step."""
 
 
 @check_arguments
@@ -81,7 +81,7 @@ def replay(
 
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
-    """What is wrong with the plan before anything moves."""
+    """Return the outcome of a plan that fails before anything moves: unstable or out of reach; None if it is fine."""
     for upto, goals in list_poses_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
@@ -93,11 +93,12 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
 
 
 def _settle(robot: Robot, plan: Plan) -> Snapshot | None:
+    """Wait until all parts rest; return their final poses, None if the simulation became unstable."""
     try:
         with robot.watch_stability():
             robot.wait(_SETTLE_S)
             wait_for_rest(robot)
     except ExecutionAborted as aborted:
         if aborted.code == "unstable_simulation":
-            return None
+            return None  # after any other failure the poses still count
     return take_snapshot(robot.scene.work, robot.data, plan.start)
