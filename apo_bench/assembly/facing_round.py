@@ -122,8 +122,7 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
 
 
 def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
-    """Measure a cone in a cone, or on a rim, in either order: two offsets, the distance from the seat, and tilts of a
-    cone.
+    """Measure a cone in a cone, or on a rim: two offsets across the axis, the distance from the seat, and tilts.
 
     The two are compared at the points of their axes where both have the same radius, in the middle of the common range.
     """
@@ -152,9 +151,7 @@ def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> FacingPair:
 
 
 def _offsets(rows: Array, p: Array) -> Array:
-    """Derivatives, (r, 6), of the coordinates of a point p of the first solid along directions, (r, 3), by its
-    twist.
-    """
+    """Derivatives, (r, 6), of the coordinates of a point p of the first solid along directions, (r, 3)."""
     return np.hstack([rows, np.cross(p, rows)])
 
 

@@ -56,8 +56,7 @@ class _Touch(NamedTuple):
 def compute_joint_play_mm(
     assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float
 ) -> float | None:
-    """The largest gap between two fit faces, of which at least one is flat, when the pair of parts uses all its play,
-    [mm].
+    """The largest gap between two fit faces, one of them flat, when the pair of parts uses all its play, [mm].
 
     The gap is that at a corner of the common area of flat faces, or at an end of a shaft on a plane. All contacts count
     that the same operation makes between the same two parts: none of them may get deeper than its own play.
@@ -122,8 +121,9 @@ def compute_apart_limit_mm(
 
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
-    """The largest gap of one pair of faces, [mm], None as in `compute_joint_play_mm`; cached, as trials of a seed share
-    poses.
+    """The largest gap of one pair of faces, [mm]; None as in `compute_joint_play_mm`.
+
+    Results are cached, since all trials of a seed share the true poses.
 
     Args:
         faces: All pairs of faces, each that of the moved part first.

@@ -124,11 +124,10 @@ def _touch_normals(assembly: Assembly, contact: Contact, rests: PartFace, poses:
 
 
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the normals that stand for two round faces, (3,), world, and the points at which each acts, (k, 3), world,
-    [m].
+    """Yield the normals that stand for a contact of two round faces, and the points at which each acts, world.
 
-    Normals point out of the resting wall and act at both ends of the common length. Cones and rims have one more
-    normal, along the axis, in the direction in which the moved part leaves.
+    Normals, (3,), point out of the resting wall and act at both ends of the common length, (k, 3), [m]. Cones and rims
+    have one more normal, along the axis, in the direction in which the moved part leaves.
     """
     kind = classify_contact(still, moved)
     out = -1.0 if still.hole else 1.0  # the free side of a hole is towards the axis, that of a shaft away from it
