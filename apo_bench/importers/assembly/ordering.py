@@ -1,8 +1,8 @@
 """Find an assembly order by disassembly: remove parts from the finished assembly, then reverse the removals.
 
-A part can be removed if the straight path out of its contacts is free, also for the hand above, and if the part would
-rest stably when put back. If no single part can be removed, a connected group is removed as a sub-assembly, which is
-put together next to the assembly first.
+A part can be removed if two conditions hold: the straight path out of its contacts is free, also for the hand above;
+and the part would rest stably when put back. If no single part can be removed, a connected group is removed as a sub-
+assembly, which is put together next to the assembly first.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

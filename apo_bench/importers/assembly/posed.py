@@ -15,7 +15,7 @@ from apo_bench.io import FileTable, read_typed
 from apo_bench.scenario.parts import find_part_path, load_part
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
 
-TABLE = "table"
+TABLE = "table"  # name of the part that stands for the table
 _TAKEN = (TABLE, "arm")
 """Names that no part of a scenario may have."""
 _MOST = 49  # parts in a file

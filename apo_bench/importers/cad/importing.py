@@ -33,6 +33,7 @@ _NEARLY_ALL = 0.98
 """The share of a flat face that must lie on pieces otherwise."""
 _SLIVERS = 0.01
 """Pieces may omit this share of the volume as slivers; then the moments are those of the pieces."""
+# Why a filled hole can make no contact.
 _FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
 

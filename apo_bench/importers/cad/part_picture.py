@@ -12,7 +12,7 @@ from apo_bench.io import save_figure, use_figure_style
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
-_FLAT, _ROUND, _REFUSED, _NAMELESS = "#8fb3d9", "#e0b070", "#d98f8f", "#cfcfcf"
+_FLAT, _ROUND, _REFUSED, _NAMELESS = "#8fb3d9", "#e0b070", "#d98f8f", "#cfcfcf"  # colors of faces by kind
 
 
 @use_figure_style()

@@ -13,7 +13,7 @@ from apo_bench.importers.cad.solids import Mesh
 from apo_bench.io import read_bytes
 
 _SUFFIXES = (".stl", ".obj", ".3mf")
-_UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+_UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # unit -> mm
 _LARGEST_BYTES = 60_000_000  # of a file
 MOST_CAD_TRIANGLES = 400_000  # in a file
 SMALLEST_PART_MM = 1.0  # shortest allowed longest side of a part

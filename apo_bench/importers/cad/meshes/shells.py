@@ -31,7 +31,7 @@ _COMMON = 1e-6
 """Solids with a smaller common volume, as a share of the smaller one, only touch."""
 _FEWER = 0.9
 """Simplify a mesh only if this share of its triangles or less remains."""
-INSIDE_OUT = "it was inside out, and was turned"
+INSIDE_OUT = "it was inside out, and was turned"  # text of a repair
 
 
 def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:

@@ -15,7 +15,7 @@ _HEADER = 84  # bytes before the first triangle of a binary file; the last four 
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])  # one triangle of a binary file
 _TEXT_BEGINS = 10_000
 """A text file names its first facet within this many bytes."""
-_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)  # a corner in a text file
 
 
 def read_stl(path: Path, raw: bytes) -> Mesh:

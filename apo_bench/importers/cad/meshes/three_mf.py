@@ -18,6 +18,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.importers.cad.solids import Mesh
 
+# Unit of 3MF -> unit of `--unit`.
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
 _LARGEST_BYTES = 60_000_000  # of all models and relations, unpacked
 _MOST_PLACES = 2000  # of objects that a file may place
@@ -25,7 +26,7 @@ _PART_TYPES = ("", "model")
 """Object types that are parts; `support`, `solidsupport`, `surface` and `other` are not."""
 _KNOWN_EXTENSIONS = {"p", "m", "t"}
 """Prefixes of extensions that do not change the shape or are read here: production, materials, triangle sets."""
-_ROOT = re.compile(rb'Target="/?([^"]+\.model)"')
+_ROOT = re.compile(rb'Target="/?([^"]+\.model)"')  # path of the root model in `_rels/.rels`
 _Key = tuple[str, str]
 """Path of the model that holds an object, and the number of the object in it."""
 

@@ -15,8 +15,8 @@ from apo_bench.importers.cad.solids.region import Region
 from apo_bench.io import clean
 from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
-_LONGEST_PART_NAME = 48
-_LONGEST_TITLE = 200
+_LONGEST_PART_NAME = 48  # characters
+_LONGEST_TITLE = 200  # characters
 _GRID = 1e-4
 """Grid on which positions are compared, as a share of the size, to hide rounding."""
 

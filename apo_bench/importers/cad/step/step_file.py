@@ -12,8 +12,9 @@ from apo_bench.importers.cad.solids import RawSolid, merge_copies
 from apo_bench.importers.cad.step.from_brep import raw_of
 
 STEP_SUFFIXES = (".step", ".stp")
-_MOST_SOLIDS = 200
-_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
+_MOST_SOLIDS = 200  # in one file
+_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}  # SI prefix of a metre -> unit
+# Name of another unit -> unit.
 _UNIT_NAMES = {
     "INCH": "in",
     "FOOT": "ft",
