@@ -177,7 +177,7 @@ class Assembly:
         return max(0.0, fits + compute_geometric_play(a, b))
 
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
-        """Least and greatest allowed distance of a contact, [m]; without play both are equal.
+        """Least and greatest allowed distance of a contact, [m]; they are equal unless its gap is a `clearance`.
 
         The play of a shaft in its hole is a disc, replaced by a polygon with its corners on the circle.
         """
