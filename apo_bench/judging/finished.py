@@ -72,8 +72,8 @@ def fixtures(assembly: Assembly) -> frozenset[str]:
 
 
 def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
-    # contacts of the part
     """Whether operation k, the last of a part, puts that part away."""
+    # contacts of the part
     mine = [relation for relation in relations if part in {end.part for end in relation.contact}]
     movable = [relation for relation in mine if not _on_fixed(assembly, relation.contact)]
     breaks = any(relation.lost == k for relation in movable)

@@ -27,7 +27,7 @@ class MethodResult:
     gap_after_m: float
     """Largest contact gap of the plan; not a number without one."""
     correction: Correction | None = None
-    """What the corrector returned; None without a corrector."""
+    """The result of the corrector; None without a corrector."""
     fitting: FittingPlan | None = None
     """The moves of the plan along free directions; None unless a corrector made the plan."""
 

@@ -148,7 +148,7 @@ def _tangents(face: RoundFace, outwards: Array, clearance_m: float) -> Array:
 
 
 def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
-    """Walls cut off from the material behind, with neighbours joined in pairs where that is near enough to the circle."""
+    """Walls cut off from the material behind; neighbours are joined in pairs if near enough to the circle."""
     left = list(lining)
     while left:
         wall = left.pop(0)
