@@ -49,7 +49,7 @@ class TouchPlace(NamedTuple):
     direction: Array
     """Direction of the motion, into the face: unit vector, (3,), world."""
     patch: Array
-    """Corners of the touching area of the hand, (k, 3), in the frame of the tip, [m]; a tilted hand touches with one."""
+    """Corners of the hand's touching area, (k, 3), in the frame of the tip, [m]; a tilted hand touches with one."""
     normal: Array
     """Unit normal of the face, outwards, (3,), world."""
     offset: float

@@ -77,7 +77,7 @@ class ProbingState:
         return touch_guard(self.wrist.sigma[0])
 
     def off_m(self, robot: Robot, T_world_tip: Array, direction: Array) -> float:
-        """Return the greatest assumed error of the tip along a direction, (3,), world, [m]: three standard deviations."""
+        """Return three standard deviations of the tip's estimate along a direction, (3,), world, [m]."""
         covariance = self.estimate.covariance_of(T_world_tip, self.jacobian(robot))[:3, :3]
         direction = T_world_tip[:3, :3].T @ direction
         return _OFF_SIGMAS * float(np.sqrt(direction @ covariance @ direction))
