@@ -162,8 +162,7 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
     """The limit of each measure, (k,), [mm].
 
     Distances between parts must be at least `room_mm`. Where the plan has less and does not fail, it must keep what it
-    has.
-    The same holds for the balance of a part.
+    has. The same holds for the balance of a part.
 
     Args:
         before: The measures of the plan.

@@ -2,10 +2,9 @@
 
 Free directions are the null space of the contact equations at the target poses. They are scaled by standard deviations
 of the observation, so a shorter vector is a likelier plan. Failures are linearised, and the shortest vector that
-repairs
-them is taken; this repeats until nothing fails (least distance problems: Lawson and Hanson, "Solving Least Squares
-Problems", 23). If that does not converge, the search restarts at evenly spread points. A point that fits is then moved
-back towards the start as far as it fits. After each move the poses are projected back onto all contacts.
+repairs them is taken; this repeats until nothing fails (least distance problems: Lawson and Hanson, "Solving Least
+Squares Problems", 23). If that does not converge, the search restarts at evenly spread points. A point that fits is
+then moved back towards the start as far as it fits. After each move the poses are projected back onto all contacts.
 """
 
 from collections.abc import Callable, Iterator
@@ -193,8 +192,7 @@ class _Search(NamedTuple):
         """A point that fits and is nearer to 0 than `far`, which fits.
 
         Bisection on the line to 0 gives the last point that fits. A new search starts just beyond it, where the plan
-        does not
-        fit; its result is taken if it is nearer.
+        does not fit; its result is taken if it is nearer.
         """
         inside = 1.0
         outside = 0.0

@@ -35,8 +35,7 @@ def content_pieces(
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
     Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
-    the
-    weights of networks, and the judge's thresholds.
+    the weights of networks, and the judge's thresholds.
 
     Args:
         source: The scenario as given to `load_scenario`.

@@ -48,8 +48,7 @@ def apply_method(
         truth: (n, 4, 4) poses of the layout, world frame, [m]; only the oracle reads them.
         reobserve: Lets a corrector observe operations again; None: it cannot.
         where: Scene or scenario of the execution, in which the plan of a corrector must fit (`fit_plan`). None: the
-            plan
-            stays as the corrector made it.
+            plan stays as the corrector made it.
     """
     if isinstance(method, str):
         if method == "oracle" and truth is not None:

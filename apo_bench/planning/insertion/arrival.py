@@ -91,8 +91,8 @@ class Arrival:
 
         Returns:
             (position, felt, across): directions in which no contact constrains the part, so its position must be
-            commanded;
-            directions of the guarded macros, which end on contact; directions between walls that enclose the part.
+            commanded; directions of the guarded macros, which end on contact; directions between walls that enclose the
+            part.
         """
         cone = classify(_normals(self.touched))
         walls = cone.rows[~cone.detachable]
@@ -238,8 +238,7 @@ def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     """Candidate exits, unit vectors (3,), off contacts that do not enclose the part, the best first.
 
     The order: straight up; against the first and the last macro; the direction that opens all contacts; axes of the
-    part;
-    each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
+    part; each normal, first tilted to open the other contacts slightly. Only exits that close no contact are yielded.
     """
     cone = classify(normals)
     if macros.locked:  # no straight exit exists: any direction serves

@@ -62,8 +62,7 @@ def residuals(known: Meetings, contacts: Sequence[Contact], poses: Poses) -> lis
     """The errors e of contacts at their overlap corners, (k,), [m], positive if the faces are apart; and normals.
 
     Flat faces that do not overlap in an area are measured at the corners of the whole environment face. A shaft on a
-    plane
-    is measured at the ends of the line of contact. The normal, (3,), is that of the flat face, world frame.
+    plane is measured at the ends of the line of contact. The normal, (3,), is that of the flat face, world frame.
 
     Args:
         known: Cache of measured contacts.

@@ -151,8 +151,7 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
 
     Returns:
         (errors at `SPEEDS`, error at rest [mm], displacement per newton along x, y, z [mm/N]); () and not a number if
-        the
-        arm has no such line in reach.
+        the arm has no such line in reach.
     """
     robot = Robot(scene, scene.scenario.start)
     errors = []

@@ -159,8 +159,7 @@ class Kinematics:
         """One Newton step of all joints, (nv,), towards T; None if the programme has no solution.
 
         Without limits, mink's quadratic programme is a linear system. If its solution keeps the limits, it also solves
-        the
-        programme.
+        the programme.
         """
         # The least of 1/2 s^T H s - c^T s with H = J^T W J and c = J^T W error: without limits H s = c. A little
         # damping on the diagonal keeps H regular where the arm is straight.
