@@ -198,6 +198,7 @@ def _pair(
     last = list(_clear(scene.kinematics, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
         change = RestingPart(translate(stroke.T, stroke.direction, -left), stroke.around)
+        # The change happens where the first grasp must stop, if the open gripper is clear there.
         if 0.0 < left < _MOST_LEFT_M and any(_clear(scene.kinematics, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.direction, left, stroke.around)
             for second in _clear(scene.kinematics, solid, last, [change], margin):
@@ -226,6 +227,7 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     size = high - low
     middle = (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
+    # From the middle of the box up to the height of the tip, in the frame of the part.
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     grasps = []
@@ -341,6 +343,7 @@ def _nearest(kinematics: Kinematics, solid: Solid, grasp: Grasp, stroke: Stroke,
     """
     lefts = _lefts(stroke)
     struck = _closed_depth(kinematics, solid, grasp, stroke, lefts, margin) > 0.0
+    # argmax: index of the first place with a collision.
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
 
 
@@ -379,6 +382,7 @@ def gripper_depth(
     """
     boxes = list_gripper_boxes(kinematics, opening, margin)
     low, high = measure_upright_bounds(boxes, R, np.zeros(3))
+    # The bounding box of the gripper at all places together.
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)
     depth = np.full(len(at), -1.0)

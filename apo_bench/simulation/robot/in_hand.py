@@ -49,9 +49,9 @@ def hold_steady(world: World, data: Any, T_world_tip: Array, carried: Carried) -
     now = get_part_pose(world, data, carried.parts[0])
     if carried.T_tip_part is not None:
         wanted = T_world_tip @ carried.T_tip_part
-        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:
+        if np.linalg.norm((wanted - now)[:3, 3]) <= SLIPS_M:  # creep; else the new pose is kept from now on
             shift = wanted @ pose.inverse(now)
-            velocity = np.array(data.qvel)
+            velocity = np.array(data.qvel)  # `set_part_pose` stops a part
             for part in carried.parts:
                 set_part_pose(world, data, part, shift @ get_part_pose(world, data, part))
             data.qvel[:] = velocity

@@ -116,7 +116,8 @@ class _Trapezoid:
 
     def __call__(self, t: Array) -> Array:
         r = self.ramp
-        top = 1.0 - self.ramp
+        top = 1.0 - self.ramp  # begin of the second ramp, and the area under the trapezoid of height 1
+        # The integral of this trapezoid: parabola, line, parabola.
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
 

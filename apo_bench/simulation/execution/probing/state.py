@@ -120,6 +120,7 @@ class ProbingState:
         for _ in range(_CORNERS):
             cornered = [self._cornered(touch, patch) for touch, patch in touches]
             self.estimate = before.touch(*(_less_common(before, cornered) if differ else cornered))
+        # From the drawn errors, not from the last residual: the estimate is of the whole errors.
         left = self._error
         E = self.estimate.hand_eye
         tool = np.array(left.tool)
@@ -131,6 +132,7 @@ class ProbingState:
 
     def _cornered(self, touch: Touch, patch: Array) -> Touch:
         """Return the touch with the foremost corner of the patch by the present estimate, or its middle if level."""
+        # Heights of the corners over the face; the lowest one touches.
         ahead = pose.apply(self.estimate.real(touch.T_world_tip, touch.jacobian), patch) @ touch.normal
         flat = float(np.ptp(ahead)) < _FLAT_M
         return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])
