@@ -34,9 +34,8 @@ def content_pieces(
 ) -> dict[str, str]:
     """Each input of a trial of a scenario -> 16 hexadecimal digits.
 
-    The inputs: the scenario (its file, or its values if there is none), each part with its files, the files of the arm,
-    the
-    room, the weights of networks, the judge's thresholds.
+    Inputs are the scenario (file, or values without a file), the files of each part, the files of the arm, the room,
+    the weights of networks, and the judge's thresholds.
 
     Args:
         source: The scenario as given to `load_scenario`.

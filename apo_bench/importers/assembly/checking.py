@@ -59,6 +59,10 @@ class Finding(NamedTuple):
 def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "six_axis") -> Iterator[Finding]:
     """Check a scenario file from its syntax to trials in which the robot knows the true poses.
 
+    Args:
+        seeds: Number of trials; 0 runs none.
+        fidelity, arm: As in `TrialConfig`.
+
     Yields:
         Each finding as soon as it is known.
 
@@ -229,7 +233,11 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
 
 
 def _trials(config: TrialConfig, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[str]:
-    """A sentence for each trial that fails."""
+    """Yield a sentence for each trial that fails.
+
+    Args:
+        config: Settings of the trials; the seed is replaced by 0, 1, ..., `seeds` - 1.
+    """
     for seed in range(seeds):
         record = run_trial(replace(config, seed=seed), scene)
         if record["success"]:

@@ -230,8 +230,7 @@ def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tu
     """The direction, (3,), that opens the next contacts while those made before stay closed, and the numbers of these.
 
     Straight up is preferred if that opens a contact and presses into none. Otherwise the normal of a contact is taken,
-    the
-    most upward ones first. The result is (zero, ()) if nothing can open.
+    the most upward ones first. The result is (zero, ()) if nothing can open.
 
     Args:
         left: Numbers of the contacts not made yet.

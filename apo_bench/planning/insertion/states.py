@@ -82,8 +82,7 @@ def classify(rows: Array) -> Cone:
     """Classify the contacts with normals or screws `rows`, (k, n): the cone of admissible motions, and its state.
 
     The linear programme seeks a motion that opens as many contacts as possible: max sum s, N x >= s, 0 <= s <= 1.
-    Motions
-    that open single contacts add up to one that opens all that can open, so every s is 0 or 1.
+    Motions that open single contacts add up to one that opens all that can open, so every s is 0 or 1.
     """
     n = rows.shape[1]
     if not len(rows):

@@ -102,8 +102,7 @@ def _forces(known: Meetings, operation: Operation, poses: Poses) -> tuple[Array,
 
     Returns:
         (points, signs, ups): points, (k, 3), world frame, [m]; 1 for up or -1 for down per point, (k,); the same per
-        level
-        contact, also for contacts without overlap.
+        level contact, also for contacts without overlap.
     """
     heights = [float((poses[e.part][:3, :3] @ known.assembly.face(e).normal)[2]) for _, e in operation.contacts]
     level = [(c, up) for c, up in zip(operation.contacts, heights, strict=True) if abs(up) >= _LEVEL]

@@ -151,8 +151,7 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
 
     Returns:
         (errors at `SPEEDS`, error at rest [mm], displacement per newton along x, y, z [mm/N]); () and not a number if
-        the
-        arm has no such line in reach.
+        the arm has no such line in reach.
     """
     robot = Robot(scene, scene.scenario.start)
     errors = []
@@ -182,7 +181,7 @@ def _push(robot: Robot, force: Array) -> Array:
     """The position of the tip, (3,), world frame, [m], after a force [N] has acted on it for `_PUSH_S`."""
     body = robot.model.body(f"arm/{robot.arm.mount}").id
     robot.data.xfrc_applied[body, :3] = force
-    # moment of the force about the body's centre of mass
+    # Moment of the force about the body's centre of mass.
     robot.data.xfrc_applied[body, 3:] = np.cross(robot.tip()[:3, 3] - robot.data.xipos[body], force)
     robot.wait(_PUSH_S)
     robot.data.xfrc_applied[body] = 0.0

@@ -32,8 +32,7 @@ def arm_moves(plan: Plan, scene: Scene, spiral: bool = False) -> tuple[ArmMove, 
     """The motion of the scene's arm in every transfer of a plan.
 
     For the default arm, and for an `Arm` made without a description, only reach is computed, since predictions without
-    an
-    arm were tuned with the default one.
+    an arm were tuned with the default one.
 
     Args:
         spiral: As in `plan_moves`.
@@ -135,8 +134,7 @@ def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]],
 
     Args:
         slowly: The insertion is as slow as a guarded motion. Rotation about the axis ahead of the tip then counts by
-            the
-            extent of the parts across that axis, which is small for a peg.
+            the extent of the parts across that axis, which is small for a peg.
     """
     error = motion_error(scene, SPEEDS[0 if slowly else 1])  # 0: touching, 1: inserting
     if error is None:

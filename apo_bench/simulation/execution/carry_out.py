@@ -145,6 +145,7 @@ def finish_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_
     if second is not None:
         grip, rise = _with_other_grip(robot, t, grip, second, T_found)
         left = _to_goal(robot, t, grip, rise, T_found)
+    # After a level insertion down onto the floor of the slot, else on in the direction of the insertion.
     lower = rise if t.into.level else 0.0
     guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.direction, t.place_n)
     robot.follow(

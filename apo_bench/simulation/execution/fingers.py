@@ -37,7 +37,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     between = plan_waypoints(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
     is_far = robot.arm.hand is not None and follow_waypoints(robot.scene.kinematics, robot.T, between, robot.q) is None
     robot.go(move_to_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
-    robot.forces.handle(t.part)
+    robot.forces.handle(t.part)  # from here on contact with this part is no collision
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     if is_tilted(at):
         robot.follow(smooth_trajectory(robot.T, above, _NEAR))
@@ -47,7 +47,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     if robot.scene.grasp == "weld":
         weld(robot.scene, robot.data, t.part, True)
     else:
-        robot.fingers(grip.half_width - robot.arm.squeeze_m)
+        robot.fingers(grip.half_width - robot.arm.squeeze_m)  # inside the part, so that the fingers press
     robot.slip_monitor = robot.slip_monitor.grasp(robot.in_hand())
     check_hold(robot, grip)
 

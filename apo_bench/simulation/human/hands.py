@@ -40,18 +40,19 @@ class Hands:
     """Two hands and the parts, for one demonstration."""
 
     def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
+        """Put all parts at their start poses; the first tick is called at once."""
         self.scene = scene
         self.world = scene.shown
         self.data: Any = make_initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
         self._hooks = as_hooks(watch)
         self._operation: int | None = None
-        self._steps = 0
-        self._every = max(1, round(self._hooks.tick_s / self._step_s))
+        self._steps = 0  # since the last tick
+        self._every = max(1, round(self._hooks.tick_s / self._step_s))  # steps of a tick
         self._tick(self.data)
         self._mocap = [int(self.world.model.body(hand).mocapid[0]) for hand in HANDS]
-        self._at = [np.eye(4) for _ in HANDS]
-        self._held: list[dict[str, Array]] = [{} for _ in HANDS]
+        self._at = [np.eye(4) for _ in HANDS]  # pose of each hand
+        self._held: list[dict[str, Array]] = [{} for _ in HANDS]  # part -> its pose in the hand
 
     def begin(self, operation: int) -> None:
         """Call the hook before an operation, counted from 0."""

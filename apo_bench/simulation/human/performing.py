@@ -90,7 +90,7 @@ def _rise(hands: Hands, operation: HandOperation, T: Array) -> float:
 
 
 def _place(hands: Hands, operation: HandOperation, stroke: Trajectory) -> None:
-    """Move the main part to its place along `stroke`; the other hand corrects displaced parts, the last one meanwhile."""
+    """Move the main part along `stroke` to its place; the other hand corrects displaced parts, the last meanwhile."""
     standing = [part for part in operation.late if part not in operation.carries]
     for part in standing[:-1]:
         _adjust(hands, part, operation.true[part], _LIFT_M, ())

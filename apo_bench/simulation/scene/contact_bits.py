@@ -80,8 +80,7 @@ def widest_disc(piece: Piece) -> float:
     """The radius of a flat disc inside a piece, [m]; the piece cannot enter a narrower hole.
 
     For boxes and cylinders it is the widest such disc, for other pieces the widest about the mean corner that is
-    parallel to
-    a side.
+    parallel to a side.
     """
     if isinstance(piece, Box):
         return float(np.sort(piece.half)[1])  # across the shortest side

@@ -25,7 +25,7 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
         solid = scenario.assembly.solids[operation.main]
-        # direction away from the gripper's approach, part frame
+        # Opposite of the direction of approach, part frame.
         up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
         span = measure_held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))

@@ -1,9 +1,8 @@
 """Separate the walls of a hole from the material behind them, so that a part rests on few pieces.
 
 A hole consists of many wedges, each of which may reach to the outside of the part. A part on a table would touch it
-with
-every wedge, at four points each. So each wedge is cut into the wall and the material behind it, which is joined to few
-pieces. Walls stand back behind flat faces by less than a round wall deviates from its circle. So does the material
+with every wedge, at four points each. So each wedge is cut into the wall and the material behind it, which is joined to
+few pieces. Walls stand back behind flat faces by less than a round wall deviates from its circle. So does the material
 behind where other pieces carry a face. Two neighbouring walls are joined if their common side, tangent to the circle in
 the middle, is near enough to the circle at its ends. The hole nowhere becomes narrower.
 """
@@ -148,7 +147,7 @@ def _tangents(face: RoundFace, outwards: Array, clearance_m: float) -> Array:
 
 
 def _coarser(lining: Sequence[_Wall], clearance_m: float) -> Iterator[Hull]:
-    """Walls cut off from the material behind, with neighbours joined in pairs where that is near enough to the circle."""
+    """Walls cut off from the material behind; neighbours are joined in pairs if near enough to the circle."""
     left = list(lining)
     while left:
         wall = left.pop(0)

@@ -46,15 +46,15 @@ class CalibrationEstimate(Protocol):
         """Return the estimate updated by touches."""
 
     def real(self, T_world_tip: Array, jacobian: Array | None) -> Array:
-        """Return the pose of the real tip, (4, 4), for an uncorrected pose.
+        """Return the estimated pose of the real tip, (4, 4).
 
         Args:
-            T_world_tip: Pose without correction, (4, 4).
+            T_world_tip: Pose that a robot without errors would have, (4, 4).
             jacobian: Body Jacobian of the tip there, (6, joints); None: joint errors are left out.
         """
 
     def command(self, T_world_tip: Array, jacobian: Array | None) -> Array:
-        """The inverse of `real`."""
+        """Return the pose to command, (4, 4), so that the real tip comes to `T_world_tip`: the inverse of `real`."""
 
     def covariance_of(self, T_world_tip: Array, jacobian: Array | None) -> Array:
         """Return the covariance of the pose of the real tip, (6, 6), as a body twist, [m, rad]."""
